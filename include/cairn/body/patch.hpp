@@ -1,0 +1,51 @@
+#pragma once
+/// Patch: a box of cells and the pieces of bodies in it. All arithmetic of a patch depends on the patch alone.
+
+#include "cairn/body/piece.hpp"
+#include "cairn/grid/lattice.hpp"
+
+#include <algorithm>
+
+namespace cairn {
+
+/// Sums over the nodes that a patch answers for, since the start.
+struct PatchLedger {
+  double contact_dissipation = 0;  // [J]
+  double boundary_work = 0;        // done by faces, walls and rigid bodies on deformable ones [J]
+  std::int64_t contact_nodes = 0;  // nodes with a contact impulse in the last step
+};
+
+template <int Dim>
+struct Patch {
+  int id;
+  Box<Dim> cells;                  // its own cells
+  Box<Dim> nodes;                  // all nodes its points can touch
+  std::vector<Link<Dim>> links;    // neighbours, in the order of sums
+  std::vector<Box<Dim>> overlaps;  // for each link, the nodes shared with it, in this patch's frame
+  int links_before = 0;            // links whose contributions come before the patch's own
+  std::vector<Piece<Dim>> pieces;  // ascending in body; those without points are ghosts
+  PatchLedger ledger;
+
+  Patch(int id_, const Lattice<Dim>& lattice) : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
+    links = lattice.links(id);
+    for (const auto& link : links) {
+      overlaps.push_back(intersection(nodes, lattice.patch_nodes(link.patch).shifted(link.shift)));
+      if (link.patch < id || (link.patch == id && link.shift > Index<Dim>{})) ++links_before;
+    }
+  }
+
+  std::int64_t point_count() const {
+    std::int64_t n = 0;
+    for (const auto& piece : pieces) n += piece.points.size();
+    return n;
+  }
+
+  /// The piece of a body, made (with `states` state columns) where there is none.
+  Piece<Dim>& piece_of(int body, int states) {
+    auto at = std::lower_bound(pieces.begin(), pieces.end(), body, [](const Piece<Dim>& p, int b) { return p.body < b; });
+    if (at == pieces.end() || at->body != body) at = pieces.emplace(at, body, states);
+    return *at;
+  }
+};
+
+}  // namespace cairn

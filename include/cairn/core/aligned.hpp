@@ -1,0 +1,32 @@
+#pragma once
+/// Arrays on 64-byte boundaries, so that no vector loop depends on an address.
+
+#include <cstddef>
+#include <new>
+#include <vector>
+
+namespace cairn {
+
+/// Allocator that starts every array on a cache line and leaves plain numbers uninitialised on resize.
+template <class T>
+struct AlignedAllocator {
+  using value_type = T;
+  AlignedAllocator() = default;
+  template <class U>
+  AlignedAllocator(const AlignedAllocator<U>& /*other*/) {}
+  T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t{64})); }
+  void deallocate(T* p, std::size_t /*n*/) { ::operator delete(p, std::align_val_t{64}); }
+  template <class U>
+  void construct(U* p) {
+    ::new (static_cast<void*>(p)) U;
+  }
+  template <class U, class... Arguments>
+  void construct(U* p, Arguments&&... arguments) {
+    ::new (static_cast<void*>(p)) U(static_cast<Arguments&&>(arguments)...);
+  }
+  friend bool operator==(const AlignedAllocator&, const AlignedAllocator&) { return true; }
+};
+
+using AlignedDoubles = std::vector<double, AlignedAllocator<double>>;
+
+}  // namespace cairn

@@ -1,0 +1,52 @@
+#pragma once
+/// Choices of method, as enums after parsing. Names are those of the case file.
+
+#include <string>
+#include <vector>
+
+namespace cairn {
+
+enum class ShapeFunction { linear, gimp, bspline2 };
+enum class StressUpdate { last, first, both, modified_last };
+enum class ContactLaw { none, stick, frictionless, friction };
+enum class Release { approach, traction, reaction };
+enum class NormalSource { density, mass_gradient, volume_gradient };
+enum class NormalChoice { common, own };
+enum class Gate { node, body };
+enum class DepartingFriction { none, coulomb, printed };
+enum class Passes { both, before, after };
+enum class FaceType { free, fixed, symmetry, wall, periodic };
+
+/// How patches are dealt to ranks; never changes a result.
+enum class Partition { metis, round_robin };
+
+struct SolverOptions {
+  ShapeFunction shape = ShapeFunction::gimp;
+  StressUpdate stress_update = StressUpdate::both;
+  double flip = 1.0;        // 1: FLIP, 0: PIC
+  int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
+};
+
+/// Overrides for one pair of materials. The name "wall" stands for wall faces.
+struct ContactPair {
+  int material_a = 0, material_b = 0;  // indices of materials; -1: wall faces
+  ContactLaw law = ContactLaw::friction;
+  double friction = 0;  // may be infinite
+};
+
+struct ContactOptions {
+  ContactLaw law = ContactLaw::friction;
+  Release release = Release::reaction;
+  double friction = 0.3;  // may be infinite
+  double fill = 0.8;
+  double impulse_limit = 0.0;  // gamma of Bardenhagen et al. 2001, eq. 21; 0: off
+  NormalSource normals = NormalSource::volume_gradient;
+  NormalChoice normal_choice = NormalChoice::common;
+  Gate gate = Gate::node;
+  DepartingFriction departing_friction = DepartingFriction::none;
+  Passes passes = Passes::both;
+  double separation = 0.0;  // [cells]; 0: no gate
+  std::vector<ContactPair> pairs;
+};
+
+}  // namespace cairn

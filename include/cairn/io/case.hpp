@@ -1,0 +1,106 @@
+#pragma once
+/// The case: everything a run needs, parsed, checked and with all defaults filled in (INTERFACE: docs/case-file.md).
+/// Vectors have three components whatever the dimension; z is 0 in 2D. SI units.
+
+#include "cairn/body/shape.hpp"
+#include "cairn/core/options.hpp"
+
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace cairn {
+
+struct Domain {
+  int dimension = 2;
+  Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();  // [m]
+  std::array<int, 3> cells = {1, 1, 1};
+  std::array<bool, 3> periodic = {false, false, false};
+  Vec3 gravity = Vec3::Zero();  // [m/s2]
+  int patch_cells = 0;          // 32 in 2D, 16 in 3D unless given
+};
+
+struct Time {
+  double end = std::numeric_limits<double>::infinity();  // [s]
+  std::int64_t steps = std::numeric_limits<std::int64_t>::max();
+  double cfl = 0.4;
+  double dt = 0;  // fixed step [s]; 0: from cfl
+};
+
+struct Material {
+  std::string name;
+  std::string model;                          // a name of material/registry.hpp
+  double density = 0;                         // [kg/m3]
+  std::map<std::string, double> parameters;   // keyed as in the law's table, every one filled in
+};
+
+/// One body: its shape, material and rigid initial motion.
+struct BodySpec {
+  Shape shape;
+  int material = 0;  // index into Case::materials
+  Vec3 velocity = Vec3::Zero();          // [m/s]
+  Vec3 angular_velocity = Vec3::Zero();  // [rad/s] about the shape's centre
+  std::string group;
+  std::string source;  // where it was defined, for messages: "case.toml:31" or "pack.csv:12"
+};
+
+/// Bodies moved as rigid parts. Exactly one of the three selections is used.
+struct Drive {
+  int overlapping = -1;    // index into face_names: bodies whose shape reaches across that face; -1: unused
+  std::vector<int> ids;
+  std::string group;
+  Vec3 velocity = Vec3::Zero();          // [m/s]
+  Vec3 angular_velocity = Vec3::Zero();  // [rad/s] about each body's centre
+};
+
+struct Face {
+  FaceType type = FaceType::free;
+  Vec3 velocity = Vec3::Zero();  // of a fixed face or wall [m/s]
+  double friction = 0;           // of a wall; may be infinite
+};
+
+/// When an output is written; several conditions may be given, none means never.
+struct Schedule {
+  std::int64_t every = 0;    // steps
+  double interval = 0;       // simulated time [s]
+  double interval_wall = 0;  // wall time [s]
+  int keep = 2;              // checkpoints kept
+  std::vector<std::string> fields;
+  bool active() const { return every > 0 || interval > 0 || interval_wall > 0; }
+};
+
+struct Output {
+  Schedule particles, grains, contacts, history, checkpoint;
+  std::vector<int> track;  // bodies of bodies.csv
+};
+
+struct Case {
+  std::string title;
+  std::filesystem::path file;  // where it was read from; grain tables are relative to its folder
+  Domain domain;
+  Time time;
+  SolverOptions solver;
+  ContactOptions contact;
+  std::vector<Material> materials;
+  std::vector<BodySpec> bodies;  // [[bodies]] in order, then the rows of every [[grains]] in order
+  std::vector<Drive> drives;
+  std::array<Face, 6> faces;
+  Output output;
+  Partition partition = Partition::metis;  // [parallel] partition
+  std::vector<std::string> warnings;
+  std::string resolved;  // the text of case.toml: every default and override filled in
+};
+
+/// One `--set KEY=VALUE`.
+struct Override {
+  std::string key, value;
+};
+
+/// Reads and checks a case file and its grain tables. Every rank may call it (it only reads).
+/// \throws InputError with every error found; each names file, line, key and remedy.
+Case read_case(const std::filesystem::path& file, const std::vector<Override>& overrides = {});
+
+}  // namespace cairn

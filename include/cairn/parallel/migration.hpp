@@ -1,0 +1,40 @@
+#pragma once
+/// Points that left their patch go to the same body's piece in the patch where they are now.
+///
+/// They are appended in the order (patch they come from, order there), so that pieces are the same on any number of ranks.
+/// Positions are wrapped at periodic boundaries and the crossings counted in the points' images.
+
+#include "cairn/body/patch.hpp"
+#include "cairn/parallel/communicator.hpp"
+
+#include <string>
+
+namespace cairn {
+
+template <int Dim>
+class Migration {
+ public:
+  /// \param owner  the rank of every patch; must outlive this object unchanged
+  Migration(NeighbourExchange& messages, const std::vector<int>& owner) : messages_(messages), owner_(owner) {}
+
+  /// Sends the points that left. Pieces left without points stay as ghosts. A point that left the domain, is not finite
+  /// or moved further than a neighbouring patch stays where it is and is reported by `failure`.
+  void start(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice);
+  /// Receives those that arrived.
+  void finish(std::vector<Patch<Dim>>& patches);
+  /// What went wrong on this rank in the last `start`; empty if nothing.
+  const std::string& failure() const { return failure_; }
+
+ private:
+  void collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice);
+
+  NeighbourExchange& messages_;
+  const std::vector<int>& owner_;
+  std::string failure_;
+};
+
+/// Sorts the points of a piece by cell, keeping the order within a cell.
+template <int Dim>
+void sort_by_cell(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Box<Dim>& cells);
+
+}  // namespace cairn

@@ -1,0 +1,23 @@
+#pragma once
+/// A whole run of a case: set-up or restart, stepping, output.
+
+#include <mpi.h>
+
+#include <filesystem>
+#include <string>
+
+#include "cairn/io/case.hpp"
+
+namespace cairn {
+
+struct RunSettings {
+  std::filesystem::path out;  // folder of the results; exists
+  std::string restart;        // empty: from the start; "latest": the last checkpoint in `out`; else a checkpoint file
+  bool profile = false;       // report where the time went
+};
+
+/// Runs the case. Collective. Returns the exit code: 0 done, 4 stopped by a signal after a checkpoint.
+/// \throws InputError when the restart does not fit the case, RunError when the run fails (on every rank).
+int run_case(const Case& c, const RunSettings& settings, MPI_Comm comm);
+
+}  // namespace cairn

@@ -1,0 +1,115 @@
+#pragma once
+/// The solver: the state of one rank and the step.
+
+#include "cairn/boundary/faces.hpp"
+#include "cairn/io/case.hpp"
+#include "cairn/parallel/migration.hpp"
+#include "cairn/parallel/node_exchange.hpp"
+#include "cairn/solver/timers.hpp"
+#include "cairn/transfer/transfer.hpp"
+
+#include <memory>
+#include <optional>
+
+namespace cairn {
+
+/// What the solver needs of a material.
+struct SolverMaterial {
+  std::string name;
+  Law law;
+  double density;                            // [kg/m3]
+  bool rigid = false;
+  double longitudinal_modulus = 0;           // [Pa]
+  std::vector<std::string_view> state_names;
+};
+
+/// Sums over all points and nodes, the same bits on any number of ranks (sums of patch sums in patch order).
+struct Totals {
+  double kinetic = 0, strain = 0, potential = 0, plastic = 0;  // [J]; rigid bodies are left out
+  double contact_dissipation = 0, boundary_work = 0;           // [J], since the start
+  Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
+  double mass = 0;                                             // [kg]
+  double contact_nodes = 0;
+  double energy() const { return kinetic + strain + potential + plastic + contact_dissipation - boundary_work; }
+};
+
+template <int Dim>
+class Simulation {
+ public:
+  /// Places the points of the case's bodies. Collective.
+  /// \throws InputError for a body without points, on every rank
+  Simulation(const Case& c, MPI_Comm comm);
+
+  /// Advances one step of at most `longest` seconds. Collective.
+  /// \throws RunError on every rank when a point is lost or the time step collapses
+  void step(double longest);
+
+  double time() const { return time_; }
+  double dt() const { return dt_; }  // of the last step
+  std::int64_t steps() const { return steps_; }
+  std::int64_t total_points() const { return total_points_; }
+  const Lattice<Dim>& lattice() const { return lattice_; }
+  const std::vector<SolverMaterial>& materials() const { return materials_; }
+  const std::vector<Body>& bodies() const { return bodies_; }
+  const std::vector<Patch<Dim>>& patches() const { return patches_; }  // of this rank, ascending
+  std::vector<Patch<Dim>>& patches() { return patches_; }
+  const std::vector<int>& owner() const { return owner_; }
+  MPI_Comm communicator() const { return comm_; }
+  const StageTimers& timers() const { return timers_; }
+  const Traffic& traffic() const { return messages_->traffic(); }
+
+  /// Energies, momentum and ledger. Collective; the result is valid on rank 0.
+  Totals totals() const;
+
+  const SolverMaterial& material_of(const Piece<Dim>& piece) const { return materials_[bodies_[piece.body].material]; }
+  bool is_rigid(const Piece<Dim>& piece) const { return bodies_[piece.body].rigid; }
+
+ private:
+  // The stages of a step, in order. Those marked (*) communicate.
+  void choose_time_step(double longest);
+  void project_points();                 // (*)
+  void contact_before_update();
+  void strain_first(double share);       // (*)
+  void contact_after_update();
+  void accelerate_points(bool again);
+  void project_again();                  // (*)
+  void strain_last(double share);
+  void move_points();
+  void migrate_points();                 // (*)
+
+  template <class F>
+  void for_pieces(F&& f) {
+    for (auto& patch : patches_)
+      for (auto& piece : patch.pieces) f(piece);
+  }
+  void move_rigid(Piece<Dim>& piece);
+  void start_speed_reduction();
+  void finish_speed_reduction();
+
+  MPI_Comm comm_;
+  int rank_ = 0, ranks_ = 1;
+  SolverOptions solver_;
+  Time limits_;
+  Lattice<Dim> lattice_;
+  TransferSettings<Dim> transfer_;
+  ContactSettings<Dim> contact_;
+  FaceConditions<Dim> faces_;
+  std::vector<SolverMaterial> materials_;
+  std::vector<Body> bodies_;
+  std::vector<Patch<Dim>> patches_;
+  std::vector<int> owner_;
+  std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
+  std::vector<WallContact<Dim>> walls_;
+  std::unique_ptr<NeighbourExchange> messages_;
+  std::unique_ptr<NodeExchange<Dim>> exchange_;
+  std::unique_ptr<Migration<Dim>> migration_;
+  StageTimers timers_;
+
+  double time_ = 0, dt_ = 0;
+  std::int64_t steps_ = 0, total_points_ = 0;
+  SpeedLimits speeds_;                            // of this rank, in the step under way
+  double speed_message_[3] = {0, 0, 0}, speed_result_[3] = {0, 0, 0};  // wave, point, failure
+  MPI_Request speed_request_ = MPI_REQUEST_NULL;
+};
+
+}  // namespace cairn

@@ -1,0 +1,87 @@
+#pragma once
+/// Transfers between the points of one piece and its nodes. No function here communicates; each works on one piece, and
+/// its arithmetic depends on that piece alone. Equations: Bardenhagen, Brackbill & Sulsky 2000, section 2.
+
+#include "cairn/body/piece.hpp"
+#include "cairn/core/options.hpp"
+#include "cairn/grid/lattice.hpp"
+#include "cairn/material/registry.hpp"
+
+namespace cairn {
+
+/// How normals are summed: with which weights, and whether by mass or by volume.
+struct NormalSettings {
+  enum class Weights { of_shape, gimp, cell_density } weights = Weights::of_shape;
+  bool by_mass = false;
+};
+
+/// What every transfer of a run shares.
+template <int Dim>
+struct TransferSettings {
+  ShapeFunction shape = ShapeFunction::gimp;
+  std::array<double, 3> half_size{};  // half a point's extent in cells, for GIMP
+  Vec<Dim> gravity = Vec<Dim>::Zero();
+  double flip = 1;
+  NormalSettings normals;
+  bool extras = false;  // stress and position sums are needed
+  bool normals_needed = true;
+
+  static TransferSettings make(const SolverOptions& solver, const ContactOptions& contact, const Vec<Dim>& gravity);
+};
+
+/// Highest speeds met, for the time step [m/s].
+struct SpeedLimits {
+  double wave = 0, point = 0;
+};
+
+/// Sets the node box of a piece to what its points touch. Comes before `project`.
+template <int Dim>
+void lay_out_nodes(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings);
+
+/// points -> nodes: sums (mass, momentum, volume, gradient), force -sum V sigma . grad N + m g, and the extras
+/// (eqs. 5-8).
+template <int Dim>
+void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density);
+
+/// nodes -> points: strain over `dt` from the nodal velocity, deformation gradient and stress; raises `speeds.wave`.
+template <int Dim>
+void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, const Law& law,
+                   double density, double dt, SpeedLimits& speeds);
+
+/// As update_stress, and points -> nodes: the force of the new stress, in the same pass.
+template <int Dim>
+void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                             const Law& law, double density, double dt, SpeedLimits& speeds);
+
+/// nodes -> points: v_p += dt sum N a (eq. 11, FLIP; blended with PIC).
+template <int Dim>
+void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt);
+
+/// points -> nodes: momentum alone, at the positions of the last projection, into NodeBox::velocity [kg m/s].
+template <int Dim>
+void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density);
+
+/// Both of these in one pass.
+template <int Dim>
+void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                            double density, double dt);
+
+/// nodes -> points: x_p += dt sum N v (eq. 10); raises `speeds.point`.
+template <int Dim>
+void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt, SpeedLimits& speeds);
+
+/// nodes: NodeMotion from sums and force: a = f/m, v = p/m + dt a (eq. 9).
+template <int Dim>
+void integrate(Piece<Dim>& piece, double dt);
+
+/// nodes: velocity = p/m from the momentum in the sums.
+template <int Dim>
+void velocity_from_sums(Piece<Dim>& piece);
+/// nodes: velocity = p/m where the velocity array holds momentum projected again.
+template <int Dim>
+void velocity_from_momentum(Piece<Dim>& piece);
+/// nodes: velocity = that of the motion, after the momentum update.
+template <int Dim>
+void velocity_from_motion(Piece<Dim>& piece);
+
+}  // namespace cairn

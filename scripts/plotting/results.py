@@ -1,0 +1,215 @@
+"""Reads a result folder: the case as it was run, the frames of material points, and the energy book.
+
+All quantities are in SI units. In two dimensions volumes are areas [m2] (plane strain, per metre of thickness).
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+FACES = ("left", "right", "bottom", "top", "back", "front")  # axis = index // 2
+
+
+class MissingData(Exception):
+    """A picture cannot be drawn from these results; the message says what is missing."""
+
+
+@dataclass
+class Shear:
+    """Two opposite faces, or the bodies across them, that slide past each other."""
+
+    axis: int  # across the sheared layer
+    along: int  # of the relative motion
+    width: float  # [m]
+    lower_velocity: float  # [m/s], along `along`
+    upper_velocity: float
+
+    def fraction(self, time: float) -> float:
+        """Average shear strain (1 = 100 %) at `time` [s]."""
+        return abs(self.upper_velocity - self.lower_velocity) * time / self.width
+
+    def uniform_displacement(self, x: np.ndarray, lower: float, time: float) -> np.ndarray:
+        """Displacement [m] along `along` at positions `x` [m] if the layer sheared uniformly."""
+        share = (x - lower) / self.width
+        return time * (self.lower_velocity + (self.upper_velocity - self.lower_velocity) * share)
+
+
+class Frame:
+    """Material points at one time. Fields are read when asked for, and not kept."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        with h5py.File(path, "r") as file:
+            group = file["VTKHDF"] if "VTKHDF" in file else file
+            self.time = float(_attribute(group, file, "time"))  # [s]
+            self.step = int(_attribute(group, file, "step"))
+            self._names = set(group["PointData"].keys()) if "PointData" in group else set()
+
+    def has(self, name: str) -> bool:
+        return name in self._names or name == "position"
+
+    def field(self, name: str) -> np.ndarray:
+        """One value or row for each point: position (N x 3) [m], velocity (N x 3) [m/s],
+        stress (N x 6: xx yy zz xy yz xz) [Pa], volume (N) [m3, m2 in 2D], body, id, image (N x 3), ..."""
+        if not self.has(name):
+            raise MissingData(f"{self.path.name} holds no field '{name}' (see output.particles.fields)")
+        with h5py.File(self.path, "r") as file:
+            group = file["VTKHDF"] if "VTKHDF" in file else file
+            return (group["Points"] if name == "position" else group["PointData"][name])[()]
+
+
+def _attribute(group: h5py.Group, file: h5py.File, name: str):
+    for holder in (group, file):
+        if name in holder.attrs:
+            return np.ravel(holder.attrs[name])[0]
+    raise MissingData(f"{file.filename} has no attribute '{name}'")
+
+
+class Run:
+    """One result folder."""
+
+    def __init__(self, folder: Path):
+        self.folder = Path(folder)
+        case_file = self.folder / "case.toml"
+        if not case_file.is_file():
+            raise MissingData(f"{self.folder} is not a result folder: it has no case.toml")
+        with open(case_file, "rb") as file:
+            self.case = tomllib.load(file)
+        domain = self.case["domain"]
+        self.dimension = int(domain.get("dimension", len(domain["lower"])))
+        self.lower = np.array(domain["lower"][: self.dimension], float)  # [m]
+        self.upper = np.array(domain["upper"][: self.dimension], float)
+        self.cells = self._cells(domain)
+        periodic = domain.get("periodic", [False] * self.dimension)
+        self.periodic = np.array(periodic[: self.dimension], bool)
+        self.title = self.case.get("title", self.folder.name)
+        self.frames = [Frame(path) for path in sorted(self.folder.glob("particles_*.vtkhdf"))]
+
+    def _cells(self, domain: dict) -> np.ndarray:
+        if "cells" in domain:
+            return np.array(domain["cells"][: self.dimension], int)
+        return np.rint((self.upper - self.lower) / domain["cell_size"]).astype(int)
+
+    @property
+    def cell_size(self) -> float:
+        """Side of a cell [m]."""
+        return float(((self.upper - self.lower) / self.cells)[0])
+
+    @property
+    def point_spacing(self) -> float:
+        """Distance between neighbouring material points at the start [m]."""
+        points = self.case.get("solver", {}).get("points_per_cell", 2**self.dimension)
+        return self.cell_size / points ** (1 / self.dimension)
+
+    def shear(self) -> Shear | None:
+        """The shearing motion that drives the run, or None."""
+        velocities = self._face_velocities()
+        for axis in range(self.dimension):
+            pair = [velocities.get(face) for face in FACES[2 * axis : 2 * axis + 2]]
+            if pair[0] is None or pair[1] is None:
+                continue
+            difference = np.abs(pair[1] - pair[0])
+            difference[axis] = 0
+            if difference.max() > 0:
+                along = int(difference.argmax())
+                return Shear(axis, along, self.upper[axis] - self.lower[axis], pair[0][along], pair[1][along])
+        return None
+
+    def _face_velocities(self) -> dict[str, np.ndarray]:
+        """Velocity [m/s] of every face that is fixed, is a wall, or carries driven bodies."""
+        velocities = {}
+        for face, condition in self.case.get("boundary", {}).items():
+            if isinstance(condition, dict) and condition.get("type") in ("fixed", "wall"):
+                velocities[face] = self._vector(condition.get("velocity"))
+        for drive in self.case.get("drive", []):
+            if face := drive.get("bodies", drive).get("overlapping"):
+                velocities[face] = self._vector(drive.get("velocity"))
+        return velocities
+
+    def _vector(self, value) -> np.ndarray:
+        components = np.zeros(self.dimension)
+        if value is not None:
+            components[:] = value[: self.dimension]
+        return components
+
+    def frame_at_shear(self, fraction: float) -> Frame:
+        """The output nearest to an average shear of `fraction`; at most 0.02 away."""
+        shear = self.shear()
+        if shear is None:
+            raise MissingData("the run is not driven in shear")
+        if not self.frames:
+            raise MissingData("there are no particles_*.vtkhdf files")
+        best = min(self.frames, key=lambda frame: abs(shear.fraction(frame.time) - fraction))
+        if abs(shear.fraction(best.time) - fraction) > 0.02:
+            raise MissingData(f"no output near {100 * fraction:.0f} % shear")
+        return best
+
+    @cached_property
+    def driven_bodies(self) -> np.ndarray:
+        """Ids of the bodies moved as rigid parts: all their points keep one and the same prescribed velocity."""
+        last = self.frames[-1]
+        if not (self.case.get("drive") and last.has("velocity") and last.has("body")):
+            return np.array([], int)
+        velocity, body = last.field("velocity")[:, : self.dimension], last.field("body")
+        prescribed = [self._vector(drive.get("velocity")) for drive in self.case["drive"]]
+        tolerance = 1e-9 * max(np.abs(velocity).max(), 1e-300)
+        moved = np.zeros(len(body), bool)
+        for value in prescribed:
+            moved |= (np.abs(velocity - value) <= tolerance).all(axis=1)
+        points = np.bincount(body)
+        return np.flatnonzero((points > 0) & (np.bincount(body, weights=moved) == points))
+
+    def mean_diameter(self) -> float:
+        """Mean diameter [m] of the bodies that are not driven, from their volume at the start."""
+        frame = self.frames[0]
+        body = frame.field("body")
+        if frame.has("volume"):
+            weights = frame.field("volume")
+        else:
+            weights = np.full(len(body), self.point_spacing**self.dimension)
+        volume = np.bincount(body, weights=weights)
+        free = np.setdiff1d(np.flatnonzero(volume > 0), self.driven_bodies)
+        factor = {2: 4 / np.pi, 3: 6 / np.pi}[self.dimension]
+        return float(np.mean((factor * volume[free]) ** (1 / self.dimension)))
+
+    def history(self) -> dict[str, np.ndarray]:
+        """Columns of history.csv by name."""
+        path = self.folder / "history.csv"
+        if not path.is_file():
+            raise MissingData("there is no history.csv (see output.history)")
+        table = np.genfromtxt(path, delimiter=",", names=True, deletechars="", encoding="utf-8")
+        if table.size == 0:
+            raise MissingData("history.csv has no rows")
+        return {name: np.atleast_1d(table[name]) for name in table.dtype.names}
+
+
+def principal_stress_difference(stress: np.ndarray) -> np.ndarray:
+    """Difference of the in-plane principal stresses [Pa], sqrt((sxx - syy)^2 + 4 sxy^2)."""
+    return np.hypot(stress[:, 0] - stress[:, 1], 2 * stress[:, 3])
+
+
+def displacement(run: Run, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement [m] of every point of `frame` since the first frame (N x dimension), matched by id, and the
+    index of each point in the first frame. Periodic crossings are undone with the field `image`."""
+    start = run.frames[0]
+    if run.periodic.any() and not (start.has("image") and frame.has("image")):
+        raise MissingData("periodic displacements need the field 'image' in output.particles.fields")
+    start_ids, ids = start.field("id"), frame.field("id")
+    order = np.argsort(start_ids)
+    match = order[np.minimum(np.searchsorted(start_ids, ids, sorter=order), len(order) - 1)]
+    if not np.array_equal(start_ids[match], ids):
+        raise MissingData(f"{frame.path.name} holds points that the first frame does not")
+    return _unwrapped(run, frame) - _unwrapped(run, start)[match], match
+
+
+def _unwrapped(run: Run, frame: Frame) -> np.ndarray:
+    position = frame.field("position")[:, : run.dimension].astype(float)
+    if run.periodic.any():
+        position = position + frame.field("image")[:, : run.dimension] * (run.upper - run.lower) * run.periodic
+    return position

@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "cairn/body/pack.hpp"
+#include "cairn/body/points.hpp"
+#include "commands.hpp"
+#include "report.hpp"
+
+namespace cairn::app {
+namespace {
+
+constexpr int samples = 32;  // for each direction, to estimate the volume of a shape
+
+/// Area (2D) or volume (3D) of a shape inside the domain; directions that are periodic do not cut.
+double volume_of(const Shape& shape, const Domain& d) {
+  if (const auto* ball = std::get_if<Ball>(&shape))
+    return volume_inside(d.dimension, ball->centre, ball->radius, d.lower, d.upper, d.periodic);
+  Bounds b = bounds(shape);
+  Vec3 step = Vec3::Zero();
+  double volume = 1;
+  for (int k = 0; k < d.dimension; ++k) {
+    if (!d.periodic[k] || !std::isfinite(b.lower[k])) b.lower[k] = std::max(b.lower[k], d.lower[k]);
+    if (!d.periodic[k] || !std::isfinite(b.upper[k])) b.upper[k] = std::min(b.upper[k], d.upper[k]);
+    step[k] = std::max(0.0, b.upper[k] - b.lower[k]) / samples;
+    volume *= step[k];
+  }
+  std::int64_t inside = 0;
+  for (int k = 0; k < (d.dimension == 3 ? samples : 1); ++k)
+    for (int j = 0; j < samples; ++j)
+      for (int i = 0; i < samples; ++i) {
+        Vec3 x = b.lower + step.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
+        if (d.dimension == 2) x.z() = 0;
+        inside += contains(shape, x);
+      }
+  return volume * static_cast<double>(inside);
+}
+
+struct Estimate {
+  double points = 0, bytes = 0;
+};
+
+/// Points from the volumes, memory from the points and the nodes that the bodies reach.
+Estimate estimate(const Case& c) {
+  const int dim = c.domain.dimension;
+  const Domain& d = c.domain;
+  constexpr double state_columns = 3, node_columns[] = {12, 16};
+  const double point_bytes = 16 + 8 * (state_columns + (dim == 2 ? PointColumns<2>::state : PointColumns<3>::state));
+  const Vec3 h = (d.upper - d.lower).cwiseQuotient(Vec3(d.cells[0], d.cells[1], d.cells[2]));
+  const double cell = h.head(dim).prod();
+  Estimate result;
+  for (const auto& body : c.bodies) {
+    const Bounds b = bounds(body.shape);
+    double nodes = 1;
+    for (int k = 0; k < dim; ++k) nodes *= std::min(b.upper[k] - b.lower[k], d.upper[k] - d.lower[k]) / h[k] + 4;
+    result.points += volume_of(body.shape, d) / cell * c.solver.points_per_cell;
+    result.bytes += nodes * 8 * node_columns[dim - 2];
+  }
+  result.bytes += result.points * point_bytes * 1.25;
+  return result;
+}
+
+std::string size_text(double bytes) {
+  if (bytes < 1e9) return fmt::format("{:.3g} MB", bytes / 1e6);
+  return fmt::format("{:.3g} GB", bytes / 1e9);
+}
+
+void print_summary(const Case& c) {
+  const Domain& d = c.domain;
+  const Estimate e = estimate(c);
+  std::string cells, periodic;
+  for (int k = 0; k < d.dimension; ++k) {
+    cells += fmt::format("{}{}", k ? " x " : "", d.cells[k]);
+    if (d.periodic[k]) periodic += fmt::format("{}{}", periodic.empty() ? ", periodic in " : " and ", "xyz"[k]);
+  }
+  fmt::print("{}: ok\n", c.file.string());
+  if (!c.title.empty()) fmt::print("  title      {}\n", c.title);
+  fmt::print("  dimension  {}{}\n", d.dimension, periodic);
+  fmt::print("  cells      {}\n", cells);
+  fmt::print("  bodies     {} of {} material{}\n", c.bodies.size(), c.materials.size(),
+             c.materials.size() == 1 ? "" : "s");
+  fmt::print("  points     about {:.0f}\n", e.points);
+  fmt::print("  memory     about {} in all\n", size_text(e.bytes));
+}
+
+}  // namespace
+
+int command_check(const std::filesystem::path& file) {
+  return on_first_rank([&] {
+    const Case c = read_case(file);
+    print_summary(c);
+    print_warnings(c.warnings);
+  });
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,16 @@
+#include <fmt/format.h>
+
+#include "cairn/io/info.hpp"
+#include "commands.hpp"
+#include "report.hpp"
+
+namespace cairn::app {
+
+int command_info(const std::filesystem::path& file) {
+  return on_first_rank([&] {
+    const std::string text = describe_file(file);
+    fmt::print("{}{}", text, text.ends_with('\n') ? "" : "\n");
+  });
+}
+
+}  // namespace cairn::app

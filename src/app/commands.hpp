@@ -1,0 +1,34 @@
+#pragma once
+/// The commands of the program. Each returns its exit code, the same on every rank, and has reported its errors.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cairn/io/case.hpp"
+
+namespace cairn::app {
+
+/// Exit codes.
+enum Exit { done = 0, wrong_input = 2, failed = 3, stopped = 4 };
+
+struct RunArguments {
+  std::filesystem::path file, out;
+  std::vector<Override> overrides;
+  std::string restart;
+  bool profile = false;
+};
+
+struct PackArguments {
+  std::filesystem::path spec, out;
+};
+
+int command_run(const RunArguments& arguments);
+int command_check(const std::filesystem::path& file);
+int command_info(const std::filesystem::path& file);
+int command_pack(const PackArguments& arguments);
+
+/// Version, compiler, libraries and instruction set.
+std::string version_text();
+
+}  // namespace cairn::app

@@ -1,0 +1,92 @@
+// The command line: parses the arguments and calls the command.
+
+#include <mpi.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <sstream>
+
+#include "commands.hpp"
+#include "report.hpp"
+
+namespace cairn::app {
+namespace {
+
+struct Arguments {
+  std::filesystem::path file;
+  RunArguments run;
+  PackArguments pack;
+  std::vector<std::string> sets;
+};
+
+/// "KEY=VALUE" to its parts. \throws CLI::ValidationError
+Override parse_override(const std::string& text) {
+  const auto equals = text.find('=');
+  if (equals == std::string::npos || equals == 0)
+    throw CLI::ValidationError("--set " + text, "not of the form KEY=VALUE, such as --set time.steps=100");
+  return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
+/// Defines the commands; `command` will hold the one to call.
+void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
+  app.require_subcommand(1);
+  app.set_version_flag("--version", version_text);
+
+  CLI::App* run = app.add_subcommand("run", "Run a case");
+  run->add_option("CASE.toml", a.file, "the case file")->required();
+  run->add_option("--out", a.run.out, "folder of the results; default: the case file's name");
+  run->add_option("--set", a.sets, "KEY=VALUE: override a key by its dotted path; VALUE is TOML; may be repeated")
+      ->allow_extra_args(false);
+  run->add_option("--restart", a.run.restart,
+                  "go on from a checkpoint FILE, or from the 'latest' in the folder of the results");
+  run->add_flag("--profile", a.run.profile, "report where the time went");
+  run->callback([&] {
+    for (const auto& text : a.sets) a.run.overrides.push_back(parse_override(text));
+    a.run.file = a.file;
+    command = [&a] { return command_run(a.run); };
+  });
+
+  CLI::App* check = app.add_subcommand("check", "Report every error of a case file; creates nothing");
+  check->add_option("CASE.toml", a.file, "the case file")->required();
+  check->callback([&] { command = [&a] { return command_check(a.file); }; });
+
+  CLI::App* info = app.add_subcommand("info", "Say what a result or checkpoint holds");
+  info->add_option("FILE.h5", a.file, "the file")->required();
+  info->callback([&] { command = [&a] { return command_info(a.file); }; });
+
+  CLI::App* pack = app.add_subcommand("pack", "Make a dense packing of grains");
+  pack->add_option("SPEC.toml", a.pack.spec, "the specification")->required();
+  pack->add_option("-o", a.pack.out, "the grain table to write")->required();
+  pack->callback([&] { command = [&a] { return command_pack(a.pack); }; });
+}
+
+int dispatch(int argc, char** argv) {
+  CLI::App app("Cairn: Material Point Method for many bodies in frictional contact", "cairn");
+  Arguments arguments;
+  std::function<int()> command;
+  define(app, arguments, command);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    std::ostringstream out, err;
+    const int code = app.exit(error, out, err);
+    if (rank() == 0) {
+      std::cout << out.str() << std::flush;
+      std::cerr << err.str() << std::flush;
+    }
+    return code == 0 ? done : wrong_input;
+  }
+  return command();
+}
+
+}  // namespace
+}  // namespace cairn::app
+
+int main(int argc, char** argv) {
+  MPI_Init(&argc, &argv);
+  int code = cairn::app::done;
+  const auto failure = cairn::app::attempt([&] { code = cairn::app::dispatch(argc, argv); });
+  if (failure) code = cairn::app::settle(failure);
+  MPI_Finalize();
+  return code;
+}

@@ -1,0 +1,97 @@
+#include "report.hpp"
+
+#include <fmt/format.h>
+#include <mpi.h>
+
+#include <chrono>
+#include <cstdio>
+#include <new>
+#include <thread>
+
+#include "cairn/core/error.hpp"
+#include "commands.hpp"
+
+namespace cairn::app {
+namespace {
+
+constexpr auto patience = std::chrono::seconds(15);
+
+/// A communicator of its own, so that reports never meet messages of the work.
+MPI_Comm report_communicator() {
+  static const MPI_Comm comm = [] {
+    MPI_Comm copy = MPI_COMM_NULL;
+    MPI_Comm_dup(MPI_COMM_WORLD, &copy);
+    return copy;
+  }();
+  return comm;
+}
+
+void print(const Failure& failure) {
+  std::fflush(stdout);
+  std::fputs((failure.text + "\n").c_str(), stderr);
+  std::fflush(stderr);
+}
+
+/// Waits for all ranks; a rank that failed prints and aborts when they do not come in time.
+void wait_for_all(MPI_Request& request, const std::optional<Failure>& failure) {
+  const auto start = std::chrono::steady_clock::now();
+  for (int arrived = 0; !arrived;) {
+    MPI_Test(&request, &arrived, MPI_STATUS_IGNORE);
+    if (arrived) return;
+    if (failure && std::chrono::steady_clock::now() - start > patience) {
+      print(*failure);
+      MPI_Abort(MPI_COMM_WORLD, failed);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+}  // namespace
+
+int rank() {
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  return rank;
+}
+
+std::optional<Failure> attempt(const std::function<void()>& work) {
+  try {
+    work();
+    return std::nullopt;
+  } catch (const InputError& error) {
+    const std::size_t count = error.messages().size();
+    return Failure{wrong_input, fmt::format("{}\ncairn: {} error{} in the input; nothing was created", error.what(),
+                                            count, count == 1 ? "" : "s")};
+  } catch (const RunError& error) {
+    return Failure{failed, fmt::format("cairn failed: {}", error.what())};
+  } catch (const std::bad_alloc&) {
+    return Failure{failed, "cairn failed: out of memory; use fewer points or more ranks"};
+  } catch (const std::exception& error) {
+    return Failure{failed, fmt::format("cairn failed: {}", error.what())};
+  }
+}
+
+int settle(const std::optional<Failure>& failure) {
+  const MPI_Comm comm = report_communicator();
+  int ranks = 1;
+  MPI_Comm_size(comm, &ranks);
+  const int candidate = failure ? rank() : ranks;
+  int first = ranks;  // lowest rank that failed
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Iallreduce(&candidate, &first, 1, MPI_INT, MPI_MIN, comm, &request);
+  wait_for_all(request, failure);
+  if (first == ranks) return done;
+  if (rank() == first) print(*failure);
+  int code = failure ? failure->code : done;
+  MPI_Bcast(&code, 1, MPI_INT, first, comm);
+  return code;
+}
+
+int on_first_rank(const std::function<void()>& work) { return settle(rank() == 0 ? attempt(work) : std::nullopt); }
+
+void print_warnings(const std::vector<std::string>& warnings) {
+  if (rank() != 0) return;
+  for (const auto& warning : warnings) std::fputs(("warning: " + warning + "\n").c_str(), stderr);
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,241 @@
+#include "cairn/boundary/faces.hpp"
+
+namespace cairn {
+namespace {
+
+/// Calls f(d, side, plane) for every face of the wanted type on which the patch lies; plane is the face's node.
+template <int Dim, class F>
+void for_faces(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces, FaceType type, F&& f) {
+  for (int d = 0; d < Dim; ++d)
+    for (int side = 0; side < 2; ++side) {
+      const int plane = side == 0 ? 0 : lattice.cells()[d];
+      const bool here = side == 0 ? patch.cells.lower[d] == 0 : patch.cells.upper[d] == plane;
+      if (here && faces[2 * d + side].type == type) f(d, side, plane);
+    }
+}
+
+/// The nodes of `box` on the face and beyond.
+template <int Dim>
+Box<Dim> at_face(Box<Dim> box, int d, int side, int plane) {
+  if (side == 0) box.upper[d] = std::min(box.upper[d], plane + 1);
+  else box.lower[d] = std::max(box.lower[d], plane);
+  return box;
+}
+
+/// Which of a node's numbers change sign in a mirror across direction d.
+template <int Dim>
+using Parity = void (*)(int d, std::vector<bool>& odd);
+
+template <int Dim>
+void mirror(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
+            AlignedDoubles NodeBox<Dim>::*values, int width, Parity<Dim> parity) {
+  for_faces<Dim>(patch, lattice, faces, FaceType::symmetry, [&](int d, int side, int plane) {
+    std::vector<bool> odd(width, false);
+    parity(d, odd);
+    const int inwards = side == 0 ? 1 : -1;
+    for (auto& piece : patch.pieces) {
+      auto& array = piece.nodes.*values;
+      if (array.empty()) continue;
+      const Box<Dim>& box = piece.nodes.box;
+      Box<Dim> on_plane = box;
+      on_plane.lower[d] = plane, on_plane.upper[d] = plane + 1;
+      for_each(intersection(on_plane, box), [&](const Index<Dim>& i) {
+        double* here = array.data() + static_cast<std::size_t>(box.offset(i)) * width;
+        for (int c = 0; c < width; ++c) here[c] = odd[c] ? 0.0 : 2 * here[c];
+        Index<Dim> inside = i, outside = i;
+        inside[d] += inwards, outside[d] -= inwards;
+        if (!box.contains(outside)) return;
+        double* out = array.data() + static_cast<std::size_t>(box.offset(outside)) * width;
+        if (!box.contains(inside)) return std::fill_n(out, width, 0.0), void();
+        double* in = array.data() + static_cast<std::size_t>(box.offset(inside)) * width;
+        for (int c = 0; c < width; ++c) in[c] += odd[c] ? -out[c] : out[c], out[c] = odd[c] ? -in[c] : in[c];
+      });
+    }
+  });
+}
+
+template <int Dim>
+Eigen::Map<Vec<Dim>> momentum_of(Piece<Dim>& piece, int node) {
+  return Eigen::Map<Vec<Dim>>(piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width +
+                              NodeSums<Dim>::momentum);
+}
+template <int Dim>
+Eigen::Map<Vec<Dim>> vector_of(AlignedDoubles& vectors, int node) {
+  return Eigen::Map<Vec<Dim>>(vectors.data() + static_cast<std::size_t>(node) * vector_width);
+}
+
+/// Calls f(piece, node position, node offset, face) for every node with mass of a deformable piece on fixed faces.
+template <int Dim, class F>
+void for_fixed_nodes(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
+                     const std::vector<Body>& bodies, F&& f) {
+  for_faces<Dim>(patch, lattice, faces, FaceType::fixed, [&](int d, int side, int plane) {
+    for (auto& piece : patch.pieces) {
+      if (bodies[piece.body].rigid) continue;
+      const Box<Dim>& box = piece.nodes.box;
+      for_each(at_face(box, d, side, plane), [&](const Index<Dim>& i) {
+        const int node = box.offset(i);
+        if (piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width] > 0)
+          f(piece, i, node, faces[2 * d + side]);
+      });
+    }
+  });
+}
+
+}  // namespace
+
+template <int Dim>
+void mirror_sums(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces) {
+  mirror<Dim>(patch, lattice, faces, &NodeBox<Dim>::sums, NodeSums<Dim>::width, [](int d, std::vector<bool>& odd) {
+    odd[NodeSums<Dim>::momentum + d] = odd[NodeSums<Dim>::gradient + d] = true;
+  });
+  mirror<Dim>(patch, lattice, faces, &NodeBox<Dim>::extras, NodeExtras<Dim>::width, [](int d, std::vector<bool>& odd) {
+    odd[NodeExtras<Dim>::position + d] = true;
+    if (Dim == 2) odd[2] = true;  // xy
+    else
+      for (int shear = 0; shear < 3; ++shear)  // xy, yz, xz
+        odd[3 + shear] = d == shear || d == (shear + 1) % 3;
+  });
+  mirror_vectors(patch, lattice, faces, &NodeBox<Dim>::force);
+}
+
+template <int Dim>
+void mirror_vectors(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
+                    AlignedDoubles NodeBox<Dim>::*vectors) {
+  mirror<Dim>(patch, lattice, faces, vectors, vector_width, [](int d, std::vector<bool>& odd) { odd[d] = true; });
+}
+
+template <int Dim>
+void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
+                        const std::vector<Body>& bodies) {
+  for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
+                       [](Piece<Dim>& piece, const Index<Dim>&, int node, const FaceCondition<Dim>& face) {
+                         vector_of<Dim>(piece.nodes.velocity, node) = face.velocity;
+                       });
+}
+
+template <int Dim>
+void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
+                      const std::vector<Body>& bodies, double dt) {
+  using M = NodeMotion<Dim>;
+  for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
+                       [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
+    const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
+    double* motion = piece.nodes.motion.data() + static_cast<std::size_t>(node) * M::width;
+    Eigen::Map<Vec<Dim>> velocity(motion + M::velocity), acceleration(motion + M::acceleration);
+    const Vec<Dim> before = momentum_of(piece, node) / mass;
+    const Vec<Dim> impulse = mass * (face.velocity - velocity);
+    velocity = face.velocity;
+    acceleration = (face.velocity - before) / dt;
+    if (!lattice.owns_node(patch.id, place)) return;
+    patch.ledger.boundary_work += impulse.dot(face.velocity);
+    patch.ledger.contact_dissipation += 0.5 * mass * (face.velocity - before).squaredNorm();
+  });
+}
+
+template <int Dim>
+void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
+                            const ContactSettings<Dim>& settings, const ContactSweep<Dim>& sweep,
+                            const std::vector<Body>& bodies) {
+  using N = NodeSums<Dim>;
+  entries_.clear();
+  for_faces<Dim>(patch, lattice, faces, FaceType::wall, [&](int d, int side, int plane) {
+    for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
+      const auto& piece = patch.pieces[k];
+      if (bodies[piece.body].rigid) continue;
+      const Box<Dim>& box = piece.nodes.box;
+      Box<Dim> on_wall = box;
+      on_wall.lower[d] = plane, on_wall.upper[d] = plane + 1;
+      for_each(intersection(on_wall, box), [&](const Index<Dim>& i) {
+        double room = lattice.cell_volume();
+        for (int e = 0; e < Dim; ++e)
+          for (int s = 0; s < 2; ++s)
+            if ((i[e] == 0 && s == 0) || (i[e] == lattice.cells()[e] && s == 1))
+              if (faces[2 * e + s].type == FaceType::wall || faces[2 * e + s].type == FaceType::fixed) room *= 0.5;
+        const bool filled =
+            settings.options.release != Release::reaction || sweep.volume_at(i) >= settings.options.fill * room;
+        Index<Dim> beyond = i;
+        beyond[d] += side == 0 ? -1 : 1;
+        const int first = static_cast<int>(entries_.size());
+        for (const Index<Dim>& place : {i, beyond}) {
+          if (!box.contains(place)) continue;
+          const int node = box.offset(place);
+          const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(node) * N::width;
+          if (!(sums[N::mass] > 0)) continue;
+          entries_.push_back({static_cast<int>(k), node, 2 * d + side, first, sums[N::mass], filled,
+                              lattice.owns_node(patch.id, place), {}, faces[2 * d + side].friction[bodies[piece.body].material]});
+        }
+      });
+    }
+  });
+}
+
+template <int Dim>
+Vec<Dim> WallContact<Dim>::impulse(const Entry& entry, const Vec<Dim>& momentum, const FaceConditions<Dim>& faces,
+                                   const ContactSettings<Dim>& settings, bool second) const {
+  using namespace contact;
+  Vec<Dim> n = Vec<Dim>::Zero();
+  n[entry.face / 2] = entry.face % 2 == 0 ? -1 : 1;
+  const Vec<Dim> P = momentum - entry.mass * faces[entry.face].velocity;
+  if (entry.law.law == ContactLaw::none || entry.law.law == ContactLaw::stick) return -P;
+  // Stress at a wall is one-sided, so that both papers' releases reduce to approach there.
+  if (settings.options.release != Release::reaction) return approach_impulse<Dim>(P, n, entry.law.friction);
+  return second ? reaction_impulse<Dim>(P, n, entry.decision, entry.law.friction) : hold_impulse<Dim>(P, n, entry.decision);
+}
+
+template <int Dim>
+void WallContact<Dim>::first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
+                                  const ContactSettings<Dim>& settings, double dt) {
+  for (std::size_t e = 0; e < entries_.size(); ++e) {
+    Entry& entry = entries_[e];
+    Piece<Dim>& piece = patch.pieces[entry.piece];
+    auto momentum = momentum_of(piece, entry.node);
+    if (entry.on_wall != static_cast<int>(e)) entry.decision = entries_[entry.on_wall].decision;
+    else if (entry.open) {
+      Vec<Dim> n = Vec<Dim>::Zero();
+      n[entry.face / 2] = entry.face % 2 == 0 ? -1 : 1;
+      const Vec<Dim> P = momentum - entry.mass * faces[entry.face].velocity;
+      const Vec<Dim> F = vector_of<Dim>(piece.nodes.force, entry.node);
+      entry.decision = contact::decide_by_reaction<Dim>(P, F, n, entry.law.friction, dt);
+    }
+    if (settings.options.passes != Passes::after) momentum += impulse(entry, momentum, faces, settings, false);
+  }
+}
+
+template <int Dim>
+void WallContact<Dim>::second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
+                                   const ContactSettings<Dim>& settings, double dt) {
+  for (const Entry& entry : entries_) {
+    Piece<Dim>& piece = patch.pieces[entry.piece];
+    auto force = vector_of<Dim>(piece.nodes.force, entry.node);
+    const Vec<Dim> before = momentum_of(piece, entry.node), momentum = before + dt * force;
+    const Vec<Dim> given = impulse(entry, momentum, faces, settings, true);
+    force += given / dt;
+    if (!entry.owned || given.isZero(0)) continue;
+    const double work = given.dot(faces[entry.face].velocity);
+    patch.ledger.boundary_work += work;
+    patch.ledger.contact_dissipation += work - 0.5 * given.dot(before + momentum + given) / entry.mass;
+    ++patch.ledger.contact_nodes;
+  }
+}
+
+template <int Dim>
+void WallContact<Dim>::repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings) {
+  if (settings.options.passes == Passes::after) return;
+  for (const Entry& entry : entries_) {
+    auto momentum = vector_of<Dim>(patch.pieces[entry.piece].nodes.velocity, entry.node);
+    momentum += impulse(entry, momentum, faces, settings, false);
+  }
+}
+
+#define CAIRN_INSTANTIATE(Dim)                                                                                          \
+  template void mirror_sums(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);                              \
+  template void mirror_vectors(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, AlignedDoubles NodeBox<Dim>::*); \
+  template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&); \
+  template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&, \
+                                 double);                                                                               \
+  template class WallContact<Dim>;
+CAIRN_INSTANTIATE(2)
+CAIRN_INSTANTIATE(3)
+#undef CAIRN_INSTANTIATE
+
+}  // namespace cairn

@@ -1,0 +1,339 @@
+#include "cairn/contact/sweep.hpp"
+
+#include <limits>
+
+namespace cairn {
+namespace {
+
+template <int Dim>
+using ConstNode = Eigen::Map<const Vec<Dim>>;
+template <int Dim>
+using Node = Eigen::Map<Vec<Dim>>;
+
+template <int Dim>
+const double* sums_at(const Piece<Dim>& piece, int node) {
+  return piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width;
+}
+
+/// Bodies with less than this share of a node's mass are not in contact there (Nairn 2013, section 3.1).
+constexpr double least_mass_share = 1e-6;
+/// Normal tractions below this share of the longitudinal modulus count as none.
+constexpr double stress_free_share = 1e-9;
+
+bool merges(ContactLaw law) { return law == ContactLaw::none || law == ContactLaw::stick; }
+
+}  // namespace
+
+template <int Dim>
+ContactSettings<Dim> ContactSettings<Dim>::make(const ContactOptions& options, std::vector<ContactMaterial> materials,
+                                                const std::array<FaceType, 6>& faces) {
+  ContactSettings s;
+  s.options = options;
+  s.materials = std::move(materials);
+  const std::size_t n = s.materials.size();
+  const auto friction_of = [](ContactLaw law, double mu) { return law == ContactLaw::frictionless ? 0.0 : mu; };
+  s.pairs.assign(n * n, {options.law, friction_of(options.law, options.friction)});
+  for (const auto& pair : options.pairs) {
+    if (pair.material_a < 0 || pair.material_b < 0) continue;
+    const PairLaw law{pair.law, friction_of(pair.law, pair.friction)};
+    s.pairs[pair.material_a * n + pair.material_b] = s.pairs[pair.material_b * n + pair.material_a] = law;
+  }
+  s.faces = faces;
+  return s;
+}
+
+template <int Dim>
+void ContactSweep<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                             const std::vector<Body>& bodies) {
+  box_ = patch.nodes;
+  count_bodies(patch);
+  list_entries(patch, lattice, settings, bodies);
+}
+
+template <int Dim>
+void ContactSweep<Dim>::count_bodies(const Patch<Dim>& patch) {
+  using N = NodeSums<Dim>;
+  bodies_at_.assign(box_.size(), 0);
+  volume_.assign(box_.size(), 0.0);
+  for (const auto& piece : patch.pieces) {
+    const double* sums = piece.nodes.sums.data();
+    for_each_row(piece.nodes.box, box_, [&](int at, int n) {
+      for (int i = 0; i < n; ++i, sums += N::width) {
+        bodies_at_[at + i] += sums[N::mass] > 0;
+        volume_[at + i] += sums[N::volume];
+      }
+    });
+  }
+}
+
+template <int Dim>
+void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                     const ContactSettings<Dim>& settings, const std::vector<Body>& bodies) {
+  shared_.clear();
+  int total = 0;
+  std::vector<Index<Dim>> places;
+  int at = 0;
+  for_each(box_, [&](const Index<Dim>& i) {
+    std::int32_t& slot = bodies_at_[at++];
+    if (slot < 2) return void(slot = -1);
+    shared_.push_back({total, slot, 0, lattice.owns_node(patch.id, i) ? 1.0 : 0.0});
+    places.push_back(i);
+    total += slot;
+    slot = static_cast<std::int32_t>(shared_.size()) - 1;
+  });
+  entries_.assign(total, {});
+  std::vector<int> filled(shared_.size(), 0);
+  for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
+    const auto& piece = patch.pieces[k];
+    int node = 0;
+    for_each_row(piece.nodes.box, box_, [&](int row, int n) {
+      for (int i = 0; i < n; ++i, ++node) {
+        const int shared = bodies_at_[row + i];
+        if (shared < 0) continue;
+        const double mass = sums_at(piece, node)[NodeSums<Dim>::mass];
+        if (!(mass > 0)) continue;
+        auto& entry = entries_[shared_[shared].first + filled[shared]++];
+        entry.piece = static_cast<int>(k), entry.node = node, entry.mass = mass, entry.rigid = bodies[piece.body].rigid;
+      }
+    });
+  }
+  for (std::size_t s = 0; s < shared_.size(); ++s) prepare(shared_[s], places[s], patch, lattice, settings, bodies);
+}
+
+template <int Dim>
+void ContactSweep<Dim>::prepare(SharedNode& node, const Index<Dim>& place, const Patch<Dim>& patch,
+                                const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                                const std::vector<Body>& bodies) {
+  ContactEntry<Dim>* entry = &entries_[node.first];
+  double room = lattice.cell_volume();
+  bool fixed = false;
+  for (int d = 0; d < Dim; ++d)
+    for (int side = 0; side < 2; ++side) {
+      if (lattice.periodic(d) || (side == 0 ? place[d] > 0 : place[d] < lattice.cells()[d])) continue;
+      const FaceType face = settings.faces[2 * d + side];
+      fixed = fixed || face == FaceType::fixed;
+      if (face == FaceType::fixed || face == FaceType::wall) room *= 0.5;
+      // On a symmetry plane sums hold both halves; beyond it they are the image of those inside.
+      if (face == FaceType::symmetry) node.share *= place[d] == 0 || place[d] == lattice.cells()[d] ? 0.5 : 0.0;
+    }
+  const bool filled = volume_[box_.offset(place)] >= settings.options.fill * room ||
+                      settings.options.release != Release::reaction;
+  double total = 0;
+  for (int i = 0; i < node.count; ++i) {
+    total += entry[i].mass;
+    const auto& best = entry[node.partner];
+    if (entry[i].rigid != best.rigid ? entry[i].rigid : entry[i].mass > best.mass) node.partner = i;
+  }
+  const int partner_material = bodies[patch.pieces[entry[node.partner].piece].body].material;
+  for (int i = 0; i < node.count; ++i) {
+    entry[i].law = settings.pair(bodies[patch.pieces[entry[i].piece].body].material, partner_material);
+    const bool heavy_enough = entry[i].mass >= least_mass_share * total;
+    entry[i].open = !fixed && !entry[i].rigid && (merges(entry[i].law.law) || (filled && heavy_enough));
+  }
+  set_normals(node, patch, settings.options.normal_choice);
+  set_gates(node, patch, lattice, settings, bodies);
+}
+
+template <int Dim>
+void ContactSweep<Dim>::set_normals(const SharedNode& node, const Patch<Dim>& patch, NormalChoice choice) {
+  ContactEntry<Dim>* entry = &entries_[node.first];
+  const auto gradient = [&](const ContactEntry<Dim>& e) -> Vec<Dim> {
+    return ConstNode<Dim>(sums_at(patch.pieces[e.piece], e.node) + NodeSums<Dim>::gradient);
+  };
+  const Vec<Dim> of_partner = gradient(entry[node.partner]);
+  for (int i = 0; i < node.count; ++i) {
+    Vec<Dim> g = gradient(entry[i]);
+    // The larger of the two gradients is the more exact one: a flat face's beside a corner's.
+    if (choice == NormalChoice::common && of_partner.squaredNorm() > g.squaredNorm()) g = -of_partner;
+    const double size = g.norm();
+    if (size > 0) entry[i].normal = g / size;
+    else if (!merges(entry[i].law.law)) entry[i].open = false;
+  }
+}
+
+template <int Dim>
+void ContactSweep<Dim>::set_gates(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                  const ContactSettings<Dim>& settings, const std::vector<Body>& bodies) {
+  using E = NodeExtras<Dim>;
+  const auto& options = settings.options;
+  if (options.release != Release::traction && options.separation <= 0) return;
+  ContactEntry<Dim>* entry = &entries_[node.first];
+  const auto extras = [&](const ContactEntry<Dim>& e) {
+    const auto& all = patch.pieces[e.piece].nodes.extras;
+    return all.empty() ? nullptr : all.data() + static_cast<std::size_t>(e.node) * E::width;
+  };
+  const auto volume = [&](const ContactEntry<Dim>& e) { return sums_at(patch.pieces[e.piece], e.node)[NodeSums<Dim>::volume]; };
+  const auto traction = [&](const ContactEntry<Dim>& e, const Vec<Dim>& n) {
+    const double* s = extras(e);
+    if (s == nullptr) return 0.0;
+    if constexpr (Dim == 2) return n[0] * n[0] * s[0] + n[1] * n[1] * s[1] + 2 * n[0] * n[1] * s[2];
+    else
+      return n[0] * n[0] * s[0] + n[1] * n[1] * s[1] + n[2] * n[2] * s[2] +
+             2 * (n[0] * n[1] * s[3] + n[1] * n[2] * s[4] + n[0] * n[2] * s[5]);
+  };
+  const auto& partner = entry[node.partner];
+  for (int i = 0; i < node.count; ++i) {
+    if (!entry[i].open || merges(entry[i].law.law)) continue;
+    double t_n = 0, tolerance = 0;
+    for (int j = 0; j < node.count; ++j) {
+      if (options.gate == Gate::body && j != i) continue;
+      const auto& material = settings.materials[bodies[patch.pieces[entry[j].piece].body].material];
+      t_n += traction(entry[j], entry[i].normal);
+      tolerance += stress_free_share * material.longitudinal_modulus * volume(entry[j]);
+    }
+    entry[i].compressive = t_n < -tolerance;
+    entry[i].stress_free = std::abs(t_n) <= tolerance;
+    if (options.separation > 0 && i != node.partner && extras(entry[i]) != nullptr && extras(partner) != nullptr) {
+      const Vec<Dim> mine = ConstNode<Dim>(extras(entry[i]) + E::position) / volume(entry[i]);
+      const Vec<Dim> theirs = ConstNode<Dim>(extras(partner) + E::position) / volume(partner);
+      if ((theirs - mine).dot(entry[i].normal) >= options.separation * lattice.smallest_spacing()) entry[i].open = false;
+    }
+  }
+}
+
+template <int Dim>
+Vec<Dim> ContactSweep<Dim>::impulse(ContactEntry<Dim>& entry, const Vec<Dim>& P, const Vec<Dim>& F,
+                                    const ContactSettings<Dim>& settings, double dt, Pass pass) const {
+  using namespace contact;
+  if (!entry.open) return Vec<Dim>::Zero();
+  if (merges(entry.law.law)) return -P;
+  const double mu = entry.law.friction;
+  switch (settings.options.release) {
+    case Release::approach: return approach_impulse<Dim>(P, entry.normal, mu);
+    case Release::traction:
+      return traction_impulse<Dim>(P, entry.normal, mu, entry.compressive, entry.stress_free,
+                                   settings.options.departing_friction);
+    case Release::reaction: break;
+  }
+  if (pass == Pass::first) entry.decision = decide_by_reaction<Dim>(P, F, entry.normal, mu, dt);
+  if (pass == Pass::second) return reaction_impulse<Dim>(P, entry.normal, entry.decision, mu);
+  return hold_impulse<Dim>(P, entry.normal, entry.decision);
+}
+
+template <int Dim>
+void ContactSweep<Dim>::resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                                double dt, Pass pass) {
+  ContactEntry<Dim>* entry = &entries_[node.first];
+  const auto& partner = entry[node.partner];
+  double mass = 0;
+  Vec<Dim> momentum = Vec<Dim>::Zero(), force = Vec<Dim>::Zero();
+  for (int i = 0; i < node.count; ++i) mass += entry[i].mass, momentum += momenta_[i], force += forces_[i];
+  if (partner.rigid) mass = partner.mass, momentum = momenta_[node.partner], force.setZero();
+  const bool own = settings.options.normal_choice == NormalChoice::own;
+  Vec<Dim> sum = Vec<Dim>::Zero();
+  for (int i = 0; i < node.count; ++i) {
+    impulses_[i].setZero();
+    if (entry[i].rigid || (i == node.partner && !(own && !merges(entry[i].law.law)))) continue;
+    const Vec<Dim> P = momenta_[i] - entry[i].mass / mass * momentum;
+    const Vec<Dim> F = forces_[i] - entry[i].mass / mass * force;
+    impulses_[i] = impulse(entry[i], P, F, settings, dt, pass);
+    const double rest = partner.rigid ? std::numeric_limits<double>::infinity() : mass - entry[i].mass;
+    impulses_[i] *= contact::impulse_scale<Dim>(impulses_[i], entry[i].mass, rest, lattice.spacing(),
+                                                settings.options.impulse_limit, dt);
+    sum += impulses_[i];
+  }
+  if (!own || merges(partner.law.law)) impulses_[node.partner] = -sum;
+}
+
+template <int Dim>
+void ContactSweep<Dim>::load_node(const SharedNode& node, const Patch<Dim>& patch, Pass pass, double dt) {
+  const std::size_t n = node.count;
+  if (momenta_.size() < n) momenta_.resize(n), forces_.resize(n), impulses_.resize(n);
+  for (int i = 0; i < node.count; ++i) {
+    const auto& entry = entries_[node.first + i];
+    const auto& nodes = patch.pieces[entry.piece].nodes;
+    const double* velocity = nodes.velocity.data() + static_cast<std::size_t>(entry.node) * vector_width;
+    const double* momentum = sums_at(patch.pieces[entry.piece], entry.node) + NodeSums<Dim>::momentum;
+    forces_[i] = ConstNode<Dim>(nodes.force.data() + static_cast<std::size_t>(entry.node) * vector_width);
+    momenta_[i] = ConstNode<Dim>(pass == Pass::repeat ? velocity : momentum);
+    if (pass == Pass::second && !entry.rigid) momenta_[i] += dt * forces_[i];
+  }
+}
+
+template <int Dim>
+void ContactSweep<Dim>::first_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                                   double dt) {
+  for (const auto& node : shared_) {
+    load_node(node, patch, Pass::first, dt);
+    resolve(node, lattice, settings, dt, Pass::first);
+    if (settings.options.passes == Passes::after) continue;
+    for (int i = 0; i < node.count; ++i) {
+      auto& entry = entries_[node.first + i];
+      if (entry.rigid) continue;
+      auto& sums = patch.pieces[entry.piece].nodes.sums;
+      Node<Dim>(sums.data() + static_cast<std::size_t>(entry.node) * NodeSums<Dim>::width + NodeSums<Dim>::momentum) +=
+          impulses_[i];
+      entry.first_impulse = impulses_[i];
+    }
+  }
+}
+
+template <int Dim>
+void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                                    double dt) {
+  patch.ledger.contact_nodes = 0;
+  for (const auto& node : shared_) {
+    load_node(node, patch, Pass::second, dt);
+    if (settings.options.passes == Passes::before)
+      // The first pass is then the only one: its impulse is given to the points instead of to the nodes.
+      for (int i = 0; i < node.count; ++i) {
+        auto& entry = entries_[node.first + i];
+        impulses_[i] = entry.first_impulse;
+        if (!entry.rigid)
+          Node<Dim>(patch.pieces[entry.piece].nodes.sums.data() +
+                    static_cast<std::size_t>(entry.node) * NodeSums<Dim>::width + NodeSums<Dim>::momentum) -= impulses_[i];
+      }
+    else
+      resolve(node, lattice, settings, dt, Pass::second);
+    for (int i = 0; i < node.count; ++i) {
+      const auto& entry = entries_[node.first + i];
+      if (entry.rigid) continue;
+      Node<Dim>(patch.pieces[entry.piece].nodes.force.data() + static_cast<std::size_t>(entry.node) * vector_width) +=
+          impulses_[i] / dt;
+    }
+    if (node.share > 0) keep_ledger(node, patch, dt);
+  }
+}
+
+template <int Dim>
+void ContactSweep<Dim>::keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt) const {
+  const auto& partner = entries_[node.first + node.partner];
+  bool touched = false;
+  for (int i = 0; i < node.count; ++i) {
+    const auto& entry = entries_[node.first + i];
+    if (entry.rigid) continue;
+    const Vec<Dim>& impulse = impulses_[i];
+    touched = touched || !impulse.isZero(0);
+    // The nodes' mean velocity over the step, from after the first pass on: strains see the same velocities, so that the
+    // energy given to the points and that taken from their strain are of one book.
+    const Vec<Dim> doubled_mean = 2 * momenta_[i] - dt * forces_[i] + impulse;
+    const double given = 0.5 * impulse.dot(doubled_mean) / entry.mass;
+    const double driven = partner.rigid ? impulse.dot(momenta_[node.partner]) / partner.mass : 0.0;
+    patch.ledger.contact_dissipation += node.share * (driven - given);
+    patch.ledger.boundary_work += node.share * driven;
+  }
+  patch.ledger.contact_nodes += touched;
+}
+
+template <int Dim>
+void ContactSweep<Dim>::repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                                    double dt) {
+  if (settings.options.passes == Passes::after && settings.options.release == Release::reaction) return;
+  for (const auto& node : shared_) {
+    load_node(node, patch, Pass::repeat, dt);
+    resolve(node, lattice, settings, dt, Pass::repeat);
+    for (int i = 0; i < node.count; ++i) {
+      const auto& entry = entries_[node.first + i];
+      if (entry.rigid) continue;
+      Node<Dim>(patch.pieces[entry.piece].nodes.velocity.data() + static_cast<std::size_t>(entry.node) * vector_width) +=
+          impulses_[i];
+    }
+  }
+}
+
+template struct ContactSettings<2>;
+template struct ContactSettings<3>;
+template class ContactSweep<2>;
+template class ContactSweep<3>;
+
+}  // namespace cairn

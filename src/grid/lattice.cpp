@@ -1,0 +1,122 @@
+#include "cairn/grid/lattice.hpp"
+
+#include <tuple>
+
+namespace cairn {
+
+template <int Dim>
+Lattice<Dim>::Lattice(const Vec<Dim>& lower, const Vec<Dim>& upper, const Index<Dim>& cells,
+                      const std::array<bool, Dim>& periodic, int patch_cells)
+    : lower_(lower), upper_(upper), cells_(cells), periodic_(periodic) {
+  for (int d = 0; d < Dim; ++d) {
+    spacing_[d] = (upper[d] - lower[d]) / cells[d];
+    inverse_[d] = cells[d] / (upper[d] - lower[d]);
+    patches_[d] = std::max(1, cells[d] / patch_cells);
+    patch_count_ *= patches_[d];
+    for (int i = 0; i <= patches_[d]; ++i)
+      cuts_[d].push_back(static_cast<int>(static_cast<std::int64_t>(i) * cells[d] / patches_[d]));
+  }
+}
+
+template <int Dim>
+int Lattice<Dim>::patch_at(const Index<Dim>& position) const {
+  int id = 0;
+  for (int d = Dim - 1; d >= 0; --d) id = id * patches_[d] + position[d];
+  return id;
+}
+
+template <int Dim>
+Index<Dim> Lattice<Dim>::patch_position(int patch) const {
+  Index<Dim> position;
+  for (int d = 0; d < Dim; ++d) position[d] = patch % patches_[d], patch /= patches_[d];
+  return position;
+}
+
+template <int Dim>
+Box<Dim> Lattice<Dim>::patch_cells(int patch) const {
+  const Index<Dim> position = patch_position(patch);
+  Box<Dim> box;
+  for (int d = 0; d < Dim; ++d) box.lower[d] = cuts_[d][position[d]], box.upper[d] = cuts_[d][position[d] + 1];
+  return box;
+}
+
+template <int Dim>
+Box<Dim> Lattice<Dim>::patch_nodes(int patch) const {
+  Box<Dim> box = patch_cells(patch);
+  for (int d = 0; d < Dim; ++d) {
+    box.lower[d] -= !periodic_[d] && box.lower[d] == 0 ? 2 : 1;
+    box.upper[d] += !periodic_[d] && box.upper[d] == cells_[d] ? 3 : 2;
+  }
+  return box;
+}
+
+template <int Dim>
+std::array<double, 2> Lattice<Dim>::patch_reach(int patch, int d) const {
+  const Box<Dim> box = patch_cells(patch);
+  const bool first = !periodic_[d] && box.lower[d] == 0, last = !periodic_[d] && box.upper[d] == cells_[d];
+  return {box.lower[d] - (first ? 0.5 : 0.0), box.upper[d] + (last ? 0.5 : 0.0)};
+}
+
+template <int Dim>
+int Lattice<Dim>::patch_of_cell(const Index<Dim>& cell) const {
+  Index<Dim> position;
+  for (int d = 0; d < Dim; ++d)
+    position[d] = static_cast<int>(std::upper_bound(cuts_[d].begin(), cuts_[d].end(), cell[d]) - cuts_[d].begin()) - 1;
+  return patch_at(position);
+}
+
+template <int Dim>
+bool Lattice<Dim>::owns_node(int patch, const Index<Dim>& node) const {
+  const Box<Dim> box = patch_cells(patch);
+  for (int d = 0; d < Dim; ++d) {
+    const bool first = !periodic_[d] && box.lower[d] == 0, last = !periodic_[d] && box.upper[d] == cells_[d];
+    if ((node[d] < box.lower[d] && !first) || (node[d] >= box.upper[d] && !last)) return false;
+  }
+  return true;
+}
+
+template <int Dim>
+std::vector<Link<Dim>> Lattice<Dim>::unpaired_links(int patch) const {
+  const Index<Dim> position = patch_position(patch);
+  std::vector<Link<Dim>> links;
+  Box<Dim> around;
+  for (int d = 0; d < Dim; ++d) around.lower[d] = -1, around.upper[d] = 2;
+  for_each(around, [&](const Index<Dim>& step) {
+    Link<Dim> link{};
+    Index<Dim> other;
+    bool exists = false;
+    for (int d = 0; d < Dim; ++d) {
+      other[d] = position[d] + step[d];
+      exists = exists || step[d] != 0;
+      if (other[d] < 0) link.shift[d] = -cells_[d], other[d] += patches_[d];
+      else if (other[d] >= patches_[d]) link.shift[d] = cells_[d], other[d] -= patches_[d];
+      if (link.shift[d] != 0 && !periodic_[d]) return;
+    }
+    if (!exists) return;
+    link.patch = patch_at(other);
+    links.push_back(link);
+  });
+  std::sort(links.begin(), links.end(), [](const auto& a, const auto& b) {
+    return std::make_tuple(a.patch, b.shift) < std::make_tuple(b.patch, a.shift);
+  });
+  return links;
+}
+
+template <int Dim>
+std::vector<Link<Dim>> Lattice<Dim>::links(int patch) const {
+  auto links = unpaired_links(patch);
+  for (auto& link : links) {
+    const auto back = unpaired_links(link.patch);
+    for (std::size_t i = 0; i < back.size(); ++i) {
+      bool reverse = back[i].patch == patch;
+      for (int d = 0; d < Dim; ++d) reverse = reverse && back[i].shift[d] == -link.shift[d];
+      if (reverse) link.mirror = static_cast<int>(i);
+    }
+  }
+  return links;
+}
+
+template class Lattice<2>;
+template class Lattice<3>;
+
+}  // namespace cairn

@@ -1,0 +1,42 @@
+#include "cairn/io/case.hpp"
+
+#include "case_sections.hpp"
+
+namespace cairn {
+
+Case read_case(const std::filesystem::path& file, const std::vector<Override>& overrides) {
+  using namespace reading;
+  toml::table tree = parse_file(file, "a case file (TOML)");
+  Errors errors(file.string());
+  apply_overrides(tree, overrides, errors);
+
+  Table root(&tree, "", {file.string(), 1}, errors);
+  Draft draft;
+  Case& c = draft.result;
+  c.file = file;
+  c.title = root.text("title", "");
+  const std::size_t before = errors.count();
+  read_domain(root.table("domain"), c.domain);
+  draft.domain_known = errors.count() == before;
+  read_time(root.table("time"), c.time);
+  read_solver(root.table("solver"), c.domain.dimension, c.solver);
+  read_materials(root.table("materials"), c.materials);
+  read_contact(root.table("contact"), c.materials, c.contact);
+  read_bodies(root, draft, errors);
+  read_grains(root, draft, errors);
+  if (!root.has("bodies") && !root.has("grains"))
+    root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
+  read_drives(root, draft);
+  read_boundary(root.table("boundary"), c.domain, c.faces);
+  read_output(root.table("output"), draft, c.output);
+  root.finish();
+  if (errors.count() == 0 && c.bodies.empty())
+    root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
+  errors.throw_if_any();
+
+  warn_about_bodies(c);
+  c.resolved = write_case(draft);
+  return std::move(draft.result);
+}
+
+}  // namespace cairn

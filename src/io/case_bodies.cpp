@@ -1,0 +1,236 @@
+// [materials], [[bodies]], [[grains]] and [[drive]].
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "cairn/material/registry.hpp"
+#include "case_names.hpp"
+#include "case_sections.hpp"
+
+namespace cairn::reading {
+namespace {
+
+const LawInfo* find_law(std::string_view name) {
+  for (const auto& law : law_infos())
+    if (law.name == name) return &law;
+  return nullptr;
+}
+
+bool has_parameter(const LawInfo& law, std::string_view key) {
+  return std::ranges::find(law.parameters, key, &Parameter::key) != law.parameters.end();
+}
+
+/// Young's modulus and Poisson's ratio instead of the shear and bulk moduli; true when the pair was used.
+bool read_youngs_pair(Table& table, const LawInfo& law, ParameterValues& values) {
+  constexpr std::string_view youngs = "youngs_modulus", poissons = "poissons_ratio";
+  if (!has_parameter(law, "shear_modulus") || !has_parameter(law, "bulk_modulus")) return false;
+  const bool direct = table.has("shear_modulus") || table.has("bulk_modulus");
+  const bool has_youngs = table.has(youngs), has_poissons = table.has(poissons);
+  if (!has_youngs && !has_poissons) {
+    if (!direct)
+      table.missing("shear_modulus",
+                    "is missing; give shear_modulus and bulk_modulus, or youngs_modulus and poissons_ratio");
+    return !direct;
+  }
+  const std::string_view given = has_youngs ? youngs : poissons;
+  if (direct) {
+    table.error(given, "is given beside shear_modulus or bulk_modulus; give one pair of the two");
+    return true;
+  }
+  const double E = table.number(youngs, std::nullopt, positive);
+  const double nu = table.number(poissons, std::nullopt, {-1, 0.5, true, true});
+  values["shear_modulus"] = E / (2 * (1 + nu));
+  values["bulk_modulus"] = E / (3 * (1 - 2 * nu));
+  return true;
+}
+
+Material read_material(Table table, const std::string& name) {
+  Material material;
+  material.name = name;
+  std::vector<std::string_view> models;
+  for (const auto& law : law_infos()) models.push_back(law.name);
+  if (!table.has("model")) table.missing("model", "is missing; choose one of " + listed(models));
+  const std::size_t choice = table.choose("model", models);
+  material.density = table.number("density", std::nullopt, positive);
+  if (choice >= models.size()) return material;  // without the model the other keys mean nothing
+  material.model = models[choice];
+  const LawInfo& law = *find_law(material.model);
+  const bool pair = read_youngs_pair(table, law, material.parameters);
+  for (const auto& p : law.parameters) {
+    const std::string key(p.key);
+    if (pair && (key == "shear_modulus" || key == "bulk_modulus")) {
+      table.has(key);
+      continue;
+    }
+    const Range range{p.lower, p.upper, !p.lower_allowed};
+    if (!table.has(key) && !p.fallback) {
+      table.missing(key, fmt::format("is missing; the {} [{}] {}", p.meaning, p.unit, range.text()));
+    } else {
+      material.parameters[key] = table.number(key, p.fallback, range);
+    }
+  }
+  table.finish();
+  return material;
+}
+
+/// Index of the material a table names; 0 after an error.
+int read_material_name(Table& table, const std::vector<Material>& materials, bool required) {
+  if (!table.has("material")) {
+    if (required) table.missing("material", "is missing; name one of " + material_list(materials));
+    return -1;
+  }
+  const bool wrong_type = !table.find("material")->is_string();
+  const std::string name = table.text("material", std::nullopt);
+  const int found = find_material(materials, name);
+  if (found < 0 && !wrong_type)
+    table.error("material",
+                fmt::format("{} is not a material; known are {}", in_quotes(name), material_list(materials)));
+  return std::max(0, found);
+}
+
+/// Reads one way of selecting bodies, from the drive itself or from its table `bodies`; adds how many were given.
+void read_selection(Table& table, const Draft& draft, Drive& drive, int& given) {
+  const auto& bodies = draft.result.bodies;
+  const Domain& domain = draft.result.domain;
+  if (table.has("ids")) {
+    ++given;
+    drive.ids = table.integers("ids");
+    check_ids(table, "ids", drive.ids, draft);
+  }
+  if (table.has("group")) {
+    ++given;
+    drive.group = table.text("group", std::nullopt);
+    const bool found = !drive.group.empty() && std::ranges::find(bodies, drive.group, &BodySpec::group) != bodies.end();
+    if (!found && draft.bodies_known)
+      table.error("group", fmt::format("{} is the group of no body; use a group given in [[bodies]] or [[grains]]",
+                                       in_quotes(drive.group)));
+  }
+  if (table.has("overlapping")) {
+    ++given;
+    drive.overlapping = table.choice("overlapping", face_index_names, -1);
+    if (drive.overlapping < 0) return;
+    const int k = drive.overlapping / 2;
+    const bool upper = drive.overlapping % 2;
+    const auto reaches = [&](const BodySpec& body) {
+      const Bounds b = bounds(body.shape);
+      return upper ? b.upper[k] >= domain.upper[k] : b.lower[k] <= domain.lower[k];
+    };
+    if (k >= domain.dimension) {
+      table.error("overlapping", "this face belongs to 3D; the case has dimension 2");
+    } else if (domain.periodic[k]) {
+      table.error("overlapping", fmt::format("direction {} is periodic and has no faces", "xyz"[k]));
+    } else if (draft.domain_known && draft.bodies_known && std::ranges::none_of(bodies, reaches)) {
+      table.error("overlapping", fmt::format("no body reaches across the face {}", face_names[drive.overlapping]));
+    }
+  }
+}
+
+}  // namespace
+
+void check_ids(Table& table, std::string_view key, const std::vector<int>& ids, const Draft& draft) {
+  const auto count = std::ssize(draft.result.bodies);
+  for (const int id : ids)
+    if (id >= count && draft.bodies_known)
+      return table.error(key, fmt::format("body {} does not exist; the bodies are 0 to {}", id, count - 1));
+}
+
+int find_material(const std::vector<Material>& materials, std::string_view name) {
+  for (std::size_t i = 0; i < materials.size(); ++i)
+    if (materials[i].name == name) return static_cast<int>(i);
+  return -1;
+}
+
+std::string material_list(const std::vector<Material>& materials) {
+  std::vector<std::string_view> names;
+  for (const auto& m : materials) names.push_back(m.name);
+  return names.empty() ? "none" : listed(names);
+}
+
+Vec3 read_angular_velocity(Table& table, int dimension) {
+  if (dimension == 3) return table.vector("angular_velocity", 3, Vec3::Zero().eval());
+  return {0, 0, table.number("angular_velocity", 0.0)};
+}
+
+void read_materials(Table materials, std::vector<Material>& result) {
+  for (const auto& name : materials.keys()) result.push_back(read_material(materials.table(name), name));
+  if (result.empty()) materials.missing("", "no material is given; give at least one table [materials.NAME]");
+}
+
+void read_bodies(Table& root, Draft& draft, Errors& errors) {
+  const Domain& domain = draft.result.domain;
+  for (Table& table : root.tables("bodies")) {
+    BodySpec body;
+    body.source = table.where().text();
+    body.shape = Ball{0.5 * (domain.lower + domain.upper), 0};
+    if (!table.has("shape"))
+      table.missing("shape", "is missing; give a table such as { type = \"disk\", centre = [0, 0], radius = 1 }");
+    if (Table shape = table.table("shape"); shape.present()) {
+      if (auto read = read_shape(shape, domain.dimension, errors)) {
+        body.shape = std::move(*read);
+        const std::string problem = draft.domain_known ? placement_problem(body.shape, domain) : "";
+        if (!problem.empty()) table.error("shape", problem);
+      }
+    }
+    body.material = read_material_name(table, draft.result.materials, true);
+    body.velocity = table.vector("velocity", domain.dimension, Vec3::Zero().eval());
+    body.angular_velocity = read_angular_velocity(table, domain.dimension);
+    body.group = table.text("group", "");
+    table.finish();
+    draft.result.bodies.push_back(std::move(body));
+  }
+  draft.shaped_bodies = draft.result.bodies.size();
+}
+
+void read_grains(Table& root, Draft& draft, Errors& errors) {
+  const int dimension = draft.result.domain.dimension;
+  for (Table& table : root.tables("grains")) {
+    GrainsSpec spec;
+    const std::string name = table.text("file", std::nullopt);
+    spec.material = read_material_name(table, draft.result.materials, false);
+    spec.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
+    spec.angular_velocity = read_angular_velocity(table, dimension);
+    spec.group = table.text("group", "");
+    table.finish();
+    const bool known = std::exchange(draft.bodies_known, false);  // until the table has been read
+    if (name.empty()) {
+      if (table.has("file") && table.find("file")->is_string()) table.error("file", "is empty; name a grain table");
+      continue;
+    }
+    const std::filesystem::path path = (draft.result.file.parent_path() / name).lexically_normal();
+    spec.file = std::filesystem::absolute(path).lexically_normal();
+    std::error_code status;
+    if (!std::filesystem::exists(path, status)) {
+      table.error("file", fmt::format("there is no file {}; the name is relative to the folder of the case file",
+                                      in_quotes(path.string())));
+      continue;
+    }
+    const std::size_t before = errors.count();
+    read_grain_table(path, spec, draft, errors);
+    draft.bodies_known = known && errors.count() == before;
+    draft.grains.push_back(std::move(spec));
+  }
+}
+
+void read_drives(Table& root, Draft& draft) {
+  for (Table& table : root.tables("drive")) {
+    Drive drive;
+    int given = 0;
+    if (Table bodies = table.table("bodies"); bodies.present()) {
+      read_selection(bodies, draft, drive, given);
+      bodies.finish();
+    }
+    read_selection(table, draft, drive, given);
+    drive.velocity = table.vector("velocity", draft.result.domain.dimension, Vec3::Zero().eval());
+    drive.angular_velocity = read_angular_velocity(table, draft.result.domain.dimension);
+    table.finish();
+    if (given != 1)
+      table.error("bodies", fmt::format("{} selections are given; give one of {{ overlapping = \"FACE\" }}, {{ ids = "
+                                        "[...] }}, {{ group = \"...\" }}",
+                                        given));
+    draft.result.drives.push_back(std::move(drive));
+  }
+}
+
+}  // namespace cairn::reading

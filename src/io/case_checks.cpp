@@ -1,0 +1,176 @@
+// What only the whole case can show: bodies out of place, overlapping, or too small for the grid.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+
+#include "case_sections.hpp"
+
+namespace cairn::reading {
+namespace {
+
+constexpr double deepest_overlap = 0.01;  // of the smaller radius, without a warning
+constexpr double least_width = 2.0;       // cells
+
+struct Disc {
+  Vec3 centre;
+  double radius;
+  int body, level;  // cells of level l are 2^l long, at least the diameter
+};
+
+/// Finds the pairs of overlapping balls. Balls are sorted into one hash grid for each power of two of their diameter; a
+/// ball searches the grids of its own size and of larger ones, so that the work stays linear for any mix of sizes.
+class OverlapSearch {
+ public:
+  OverlapSearch(const Case& c) : domain_(c.domain) {
+    for (std::size_t i = 0; i < c.bodies.size(); ++i)
+      if (const auto* ball = std::get_if<Ball>(&c.bodies[i].shape)) {
+        const int level = static_cast<int>(std::ceil(std::log2(2 * ball->radius)));
+        discs_.push_back({ball->centre, ball->radius, static_cast<int>(i), level});
+        largest_ = std::max(largest_, ball->radius);
+        if (std::ranges::find(levels_, level) == levels_.end()) levels_.push_back(level);
+      }
+    next_.assign(discs_.size(), -1);
+    for (int i = 0; i < std::ssize(discs_); ++i) {
+      const auto [entry, fresh] = first_.try_emplace(key(discs_[i].level, cell(discs_[i].centre, discs_[i].level)), i);
+      if (!fresh) next_[i] = std::exchange(entry->second, i);
+    }
+  }
+
+  void run() {
+    for (int i = 0; i < std::ssize(discs_); ++i) {
+      std::array<int, 3> reach;
+      for (int k = 0; k < 3; ++k) reach[k] = k < domain_.dimension && domain_.periodic[k] ? 1 : 0;
+      for (int a = -reach[0]; a <= reach[0]; ++a)
+        for (int b = -reach[1]; b <= reach[1]; ++b)
+          for (int c = -reach[2]; c <= reach[2]; ++c) search_image(i, {a, b, c});
+    }
+  }
+
+  std::int64_t count = 0;
+  int first_a = -1, first_b = -1;  // bodies of the pair that comes first
+  double depth = 0;                // its depth relative to the smaller radius
+
+ private:
+  using Cell = std::array<std::int64_t, 3>;
+
+  Cell cell(const Vec3& x, int level) const {
+    Cell result{};
+    for (int k = 0; k < domain_.dimension; ++k)
+      result[k] =
+          static_cast<std::int64_t>(std::floor(std::ldexp(std::clamp(x[k] - domain_.lower[k], -1e300, 1e300), -level)));
+    return result;
+  }
+  static std::uint64_t key(int level, const Cell& c) {
+    std::uint64_t hash = static_cast<std::uint64_t>(level) * 0x9e3779b97f4a7c15ULL;
+    for (const std::int64_t v : c)
+      hash = (hash ^ static_cast<std::uint64_t>(v)) * 0xff51afd7ed558ccdULL, hash ^= hash >> 32;
+    return hash;
+  }
+
+  void search_image(int i, const std::array<int, 3>& image) {
+    Vec3 x = discs_[i].centre;
+    for (int k = 0; k < domain_.dimension; ++k) {
+      const double length = domain_.upper[k] - domain_.lower[k], room = discs_[i].radius + largest_;
+      x[k] += image[k] * length;
+      if (image[k] != 0 && (x[k] < domain_.lower[k] - room || x[k] > domain_.upper[k] + room)) return;
+    }
+    const int depth_z = domain_.dimension == 3 ? 1 : 0;
+    for (const int level : levels_) {
+      if (level < discs_[i].level) continue;
+      const Cell at = cell(x, level);
+      for (int a = -1; a <= 1; ++a)
+        for (int b = -1; b <= 1; ++b)
+          for (int c = -depth_z; c <= depth_z; ++c) {
+            const auto found = first_.find(key(level, {at[0] + a, at[1] + b, at[2] + c}));
+            for (int j = found == first_.end() ? -1 : found->second; j >= 0; j = next_[j]) compare(i, x, level, j);
+          }
+    }
+  }
+
+  void compare(int i, const Vec3& x, int level, int j) {
+    const Disc& other = discs_[j];
+    if (other.level != level || (level == discs_[i].level && j <= i)) return;
+    const double smaller = std::min(discs_[i].radius, other.radius);
+    const double overlap = (discs_[i].radius + other.radius - (x - other.centre).norm()) / smaller;
+    if (overlap <= deepest_overlap) return;
+    ++count;
+    const int a = std::min(discs_[i].body, other.body), b = std::max(discs_[i].body, other.body);
+    if (first_a >= 0 && std::pair(a, b) >= std::pair(first_a, first_b)) return;
+    first_a = a;
+    first_b = b;
+    depth = overlap;
+  }
+
+  const Domain& domain_;
+  std::vector<Disc> discs_;
+  std::vector<int> levels_, next_;
+  std::unordered_map<std::uint64_t, int> first_;
+  double largest_ = 0;
+};
+
+double smallest_cell(const Domain& d) {
+  double least = infinity;
+  for (int k = 0; k < d.dimension; ++k) least = std::min(least, (d.upper[k] - d.lower[k]) / d.cells[k]);
+  return least;
+}
+
+}  // namespace
+
+std::string placement_problem(const Shape& shape, const Domain& domain) {
+  const Bounds b = bounds(shape);
+  const Vec3 middle = centre(shape);
+  const auto* ball = std::get_if<Ball>(&shape);
+  double gap2 = 0;  // squared distance from a ball's centre to the domain
+  for (int k = 0; k < domain.dimension; ++k) {
+    const double lower = domain.lower[k], upper = domain.upper[k];
+    if (b.lower[k] > b.upper[k]) return "the shape is empty; its parts must share points";
+    if (domain.periodic[k] && std::isfinite(b.lower[k]) && std::isfinite(b.upper[k])) {
+      if (middle[k] < lower || middle[k] > upper)
+        return fmt::format(
+            "the centre has {} = {}, outside the domain [{}, {}], which is periodic there; move it by the period {}",
+            "xyz"[k], middle[k], lower, upper, upper - lower);
+      if (!std::holds_alternative<Compound>(shape) && b.upper[k] - b.lower[k] > (upper - lower) * (1 + 1e-9))
+        return fmt::format("the body is {} wide in direction {}, more than the period {}; it must fit",
+                           b.upper[k] - b.lower[k], "xyz"[k], upper - lower);
+      continue;
+    }
+    if (b.upper[k] <= lower || b.lower[k] >= upper)
+      return fmt::format("the body lies outside the domain: it spans [{}, {}] in direction {}, the domain [{}, {}]",
+                         b.lower[k], b.upper[k], "xyz"[k], lower, upper);
+    const double gap = std::max({lower - middle[k], middle[k] - upper, 0.0});
+    gap2 += gap * gap;
+  }
+  if (ball && gap2 >= ball->radius * ball->radius)
+    return "the body lies outside the domain, beyond one of its corners; it must reach inside";
+  return {};
+}
+
+void warn_about_bodies(Case& result) {
+  const auto& bodies = result.bodies;
+  const double least = least_width * smallest_cell(result.domain) * (1 - 1e-9);
+  std::int64_t small = 0, first = -1;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (smallest_width(bodies[i].shape) >= least) continue;
+    if (small++ == 0) first = static_cast<std::int64_t>(i);
+  }
+  if (small > 0)
+    result.warnings.push_back(fmt::format(
+        "{}: body {} is {:.3g} cells wide; {} of {} bodies are thinner than 2 cells (a grain's radius below 1 cell) "
+        "and will be badly "
+        "resolved; use more cells",
+        bodies[first].source, first, least_width * smallest_width(bodies[first].shape) / least, small, bodies.size()));
+  OverlapSearch search(result);
+  search.run();
+  if (search.count > 0)
+    result.warnings.push_back(
+        fmt::format("{}: body {} overlaps body {} ({}) by {:.3g} of the smaller radius; {} pairs of round bodies "
+                    "overlap by more than {} of it and "
+                    "will start under stress or share their points' room",
+                    bodies[search.first_a].source, search.first_a, search.first_b, bodies[search.first_b].source,
+                    search.depth, search.count, deepest_overlap));
+}
+
+}  // namespace cairn::reading

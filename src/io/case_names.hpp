@@ -1,0 +1,44 @@
+#pragma once
+/// Names of the choices in the case file.
+
+#include "case_reader.hpp"
+
+namespace cairn::reading {
+
+inline constexpr Named<ShapeFunction> shape_function_names[] = {
+    {"linear", ShapeFunction::linear}, {"gimp", ShapeFunction::gimp}, {"bspline2", ShapeFunction::bspline2}};
+inline constexpr Named<StressUpdate> stress_update_names[] = {{"last", StressUpdate::last},
+                                                              {"first", StressUpdate::first},
+                                                              {"both", StressUpdate::both},
+                                                              {"modified_last", StressUpdate::modified_last}};
+inline constexpr Named<ContactLaw> contact_law_names[] = {{"none", ContactLaw::none},
+                                                          {"stick", ContactLaw::stick},
+                                                          {"frictionless", ContactLaw::frictionless},
+                                                          {"friction", ContactLaw::friction}};
+inline constexpr Named<Release> release_names[] = {
+    {"approach", Release::approach}, {"traction", Release::traction}, {"reaction", Release::reaction}};
+inline constexpr Named<NormalSource> normal_source_names[] = {{"density", NormalSource::density},
+                                                              {"mass_gradient", NormalSource::mass_gradient},
+                                                              {"volume_gradient", NormalSource::volume_gradient}};
+inline constexpr Named<NormalChoice> normal_choice_names[] = {{"common", NormalChoice::common},
+                                                              {"own", NormalChoice::own}};
+inline constexpr Named<Gate> gate_names[] = {{"node", Gate::node}, {"body", Gate::body}};
+inline constexpr Named<DepartingFriction> departing_friction_names[] = {{"none", DepartingFriction::none},
+                                                                        {"coulomb", DepartingFriction::coulomb},
+                                                                        {"printed", DepartingFriction::printed}};
+inline constexpr Named<Passes> passes_names[] = {
+    {"both", Passes::both}, {"before", Passes::before}, {"after", Passes::after}};
+inline constexpr Named<FaceType> face_type_names[] = {
+    {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
+inline constexpr Named<int> face_index_names[] = {{"left", 0}, {"right", 1}, {"bottom", 2},
+                                                  {"top", 3},  {"back", 4},  {"front", 5}};
+inline constexpr Named<CompoundOperation> compound_names[] = {{"union", CompoundOperation::union_of},
+                                                              {"difference", CompoundOperation::difference},
+                                                              {"intersection", CompoundOperation::intersection}};
+
+/// Fields of the particle files, beside the position, which is always written.
+inline constexpr std::string_view particle_fields[] = {
+    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "plastic_strain", "image"};
+inline constexpr std::size_t default_particle_fields = 6;  // the first six
+
+}  // namespace cairn::reading

@@ -1,0 +1,59 @@
+#pragma once
+/// The sections of the case file, one function each. All report errors through their table and go on.
+
+#include "case_reader.hpp"
+
+namespace cairn::reading {
+
+/// One [[grains]] entry: a table of balls and what they share.
+struct GrainsSpec {
+  std::filesystem::path file;  // absolute
+  int material = -1;           // -1: every row names its own
+  Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+  std::string group;
+};
+
+/// A case while it is read.
+struct Draft {
+  Case result;
+  bool domain_known = false;       // the domain was read without an error
+  bool bodies_known = true;        // every grain table was read, so that the number of bodies is right
+  std::size_t shaped_bodies = 0;   // bodies from [[bodies]]; the rest come from the tables
+  std::vector<GrainsSpec> grains;  // in order
+};
+
+void read_domain(Table domain, Domain& result);
+void read_time(Table time, Time& result);
+void read_solver(Table solver, int dimension, SolverOptions& result);
+void read_contact(Table contact, const std::vector<Material>& materials, ContactOptions& result);
+void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& faces);
+void read_output(Table output, const Draft& draft, Output& result);
+void read_materials(Table materials, std::vector<Material>& result);
+/// The shape a table describes; nothing after an error.
+std::optional<Shape> read_shape(Table table, int dimension, Errors& errors);
+void read_bodies(Table& root, Draft& draft, Errors& errors);
+void read_grains(Table& root, Draft& draft, Errors& errors);
+void read_drives(Table& root, Draft& draft);
+
+/// Appends the balls of a grain table.
+void read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors);
+
+/// Reports ids of bodies that do not exist.
+void check_ids(Table& table, std::string_view key, const std::vector<int>& ids, const Draft& draft);
+
+/// Index of a material; -1 if there is none of that name.
+int find_material(const std::vector<Material>& materials, std::string_view name);
+/// Material names, for messages.
+std::string material_list(const std::vector<Material>& materials);
+/// Spin in 2D is one number, in 3D a vector.
+Vec3 read_angular_velocity(Table& table, int dimension);
+
+/// What is wrong with the place of a body; empty when nothing is.
+std::string placement_problem(const Shape& shape, const Domain& domain);
+/// Adds the warnings: overlapping balls, bodies thinner than two cells.
+void warn_about_bodies(Case& result);
+
+/// The complete case file of a draft.
+std::string write_case(const Draft& draft);
+
+}  // namespace cairn::reading

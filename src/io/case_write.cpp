@@ -1,0 +1,240 @@
+// The case as a file that reads back to the same case.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "case_names.hpp"
+#include "case_sections.hpp"
+
+namespace cairn::reading {
+namespace {
+
+/// The shortest text that reads back to the same bits, always as a TOML float.
+std::string text_of(double value) {
+  std::string text = fmt::format("{}", value);
+  if (std::isfinite(value) && text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text;
+}
+std::string text_of(bool value) { return value ? "true" : "false"; }
+std::string text_of(std::int64_t value) { return std::to_string(value); }
+std::string text_of(int value) { return std::to_string(value); }
+std::string text_of(std::string_view value) {
+  std::string text = "\"";
+  for (const char c : value) {
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      text += {'\\', c};
+    } else if (code < 32 || code == 127) {
+      text += fmt::format("\\u{:04X}", code);
+    } else {
+      text += c;
+    }
+  }
+  return text + '"';
+}
+
+/// [a, b, c] of the first `size` entries.
+template <class List>
+std::string list_of(const List& values, std::ptrdiff_t size) {
+  std::string text = "[";
+  for (std::ptrdiff_t i = 0; i < size; ++i) text += (i ? ", " : "") + text_of(values[i]);
+  return text + "]";
+}
+
+std::string key_of(std::string_view name) {
+  const auto bare = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; };
+  return !name.empty() && std::ranges::all_of(name, bare) ? std::string(name) : text_of(name);
+}
+
+/// Writes the shapes: `dim` decides the names and the length of vectors.
+struct ShapeWriter {
+  int dim;
+  std::string vec(const Vec3& v) const { return list_of(v, dim); }
+  std::string operator()(const Ball& s) const {
+    return fmt::format("{{ type = \"{}\", centre = {}, radius = {} }}", dim == 2 ? "disk" : "sphere", vec(s.centre),
+                       text_of(s.radius));
+  }
+  std::string operator()(const BoxShape& s) const {
+    return fmt::format("{{ type = \"box\", lower = {}, upper = {}, angle = {} }}", vec(s.lower), vec(s.upper),
+                       text_of(s.angle));
+  }
+  std::string operator()(const Ellipsoid& s) const {
+    return fmt::format("{{ type = \"{}\", centre = {}, radii = {}, angle = {} }}", dim == 2 ? "ellipse" : "ellipsoid",
+                       vec(s.centre), vec(s.radii), text_of(s.angle));
+  }
+  std::string operator()(const Polygon& s) const {
+    std::string points;
+    for (const Vec3& p : s.points) points += (points.empty() ? "" : ", ") + vec(p);
+    return fmt::format("{{ type = \"polygon\", points = [{}] }}", points);
+  }
+  std::string operator()(const Cylinder& s) const {
+    return fmt::format("{{ type = \"cylinder\", from = {}, to = {}, radius = {} }}", vec(s.from), vec(s.to),
+                       text_of(s.radius));
+  }
+  std::string operator()(const HalfSpace& s) const {
+    return fmt::format("{{ type = \"half_space\", point = {}, normal = {} }}", vec(s.point), vec(s.normal));
+  }
+  std::string operator()(const Compound& s) const {
+    std::string parts;
+    for (const Shape& part : s.of) parts += (parts.empty() ? "" : ", ") + std::visit(*this, part);
+    return fmt::format("{{ type = \"{}\", of = [{}] }}", name_of(compound_names, s.operation), parts);
+  }
+};
+
+class Writer {
+ public:
+  explicit Writer(int dimension) : dim_(dimension) {}
+  void section(std::string_view header) { text_ += fmt::format("\n{}\n", header); }
+  template <class T>
+  void key(std::string_view name, const T& value) {
+    raw(name, text_of(value));
+  }
+  void raw(std::string_view name, std::string_view value) { text_ += fmt::format("{} = {}\n", name, value); }
+  void vector(std::string_view name, const Vec3& v) { raw(name, list_of(v, dim_)); }
+  void spin(const Vec3& w) { raw("angular_velocity", dim_ == 3 ? list_of(w, 3) : text_of(w.z())); }
+  void motion(const Vec3& v, const Vec3& w) {
+    vector("velocity", v);
+    spin(w);
+  }
+  std::string take() { return std::move(text_); }
+
+ private:
+  int dim_;
+  std::string text_;
+};
+
+void write_domain(Writer& out, const Domain& d) {
+  out.section("[domain]");
+  out.key("dimension", d.dimension);
+  out.vector("lower", d.lower);
+  out.vector("upper", d.upper);
+  out.raw("cells", list_of(d.cells, d.dimension));
+  out.raw("periodic", list_of(d.periodic, d.dimension));
+  out.vector("gravity", d.gravity);
+  out.key("patch_cells", d.patch_cells);
+}
+
+void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& solver) {
+  out.section("[time]");
+  if (std::isfinite(time.end)) out.key("end", time.end);
+  if (time.steps != Time{}.steps) out.key("steps", time.steps);
+  out.key("cfl", time.cfl);
+  if (time.dt > 0) out.key("dt", time.dt);
+  out.section("[solver]");
+  out.key("shape", name_of(shape_function_names, solver.shape));
+  out.key("stress_update", name_of(stress_update_names, solver.stress_update));
+  out.key("flip", solver.flip);
+  out.key("points_per_cell", solver.points_per_cell);
+}
+
+void write_contact(Writer& out, const Case& c) {
+  const ContactOptions& contact = c.contact;
+  out.section("[contact]");
+  out.key("law", name_of(contact_law_names, contact.law));
+  out.key("release", name_of(release_names, contact.release));
+  out.key("friction", contact.friction);
+  out.key("fill", contact.fill);
+  out.key("impulse_limit", contact.impulse_limit);
+  out.key("normals", name_of(normal_source_names, contact.normals));
+  out.key("normal_choice", name_of(normal_choice_names, contact.normal_choice));
+  out.key("gate", name_of(gate_names, contact.gate));
+  out.key("departing_friction", name_of(departing_friction_names, contact.departing_friction));
+  out.key("passes", name_of(passes_names, contact.passes));
+  out.key("separation", contact.separation);
+  const auto name = [&](int material) { return material < 0 ? "wall" : c.materials[material].name; };
+  for (const auto& pair : contact.pairs) {
+    out.section("[[contact.pair]]");
+    out.raw("materials", fmt::format("[{}, {}]", text_of(name(pair.material_a)), text_of(name(pair.material_b))));
+    out.key("law", name_of(contact_law_names, pair.law));
+    out.key("friction", pair.friction);
+  }
+}
+
+void write_bodies(Writer& out, const Draft& draft) {
+  const Case& c = draft.result;
+  for (const auto& m : c.materials) {
+    out.section("[materials." + key_of(m.name) + "]");
+    out.key("model", m.model);
+    out.key("density", m.density);
+    for (const auto& [name, value] : m.parameters) out.key(key_of(name), value);
+  }
+  for (std::size_t i = 0; i < draft.shaped_bodies; ++i) {
+    const BodySpec& body = c.bodies[i];
+    out.section("[[bodies]]");
+    out.raw("shape", std::visit(ShapeWriter{c.domain.dimension}, body.shape));
+    out.key("material", c.materials[body.material].name);
+    out.motion(body.velocity, body.angular_velocity);
+    if (!body.group.empty()) out.key("group", body.group);
+  }
+  for (const auto& grains : draft.grains) {
+    out.section("[[grains]]");
+    out.key("file", grains.file.string());
+    if (grains.material >= 0) out.key("material", c.materials[grains.material].name);
+    out.motion(grains.velocity, grains.angular_velocity);
+    if (!grains.group.empty()) out.key("group", grains.group);
+  }
+  for (const auto& drive : c.drives) {
+    out.section("[[drive]]");
+    if (drive.overlapping >= 0) {
+      out.raw("bodies", fmt::format("{{ overlapping = \"{}\" }}", face_names[drive.overlapping]));
+    } else if (!drive.group.empty()) {
+      out.raw("bodies", "{ group = " + text_of(drive.group) + " }");
+    } else {
+      out.raw("bodies", "{ ids = " + list_of(drive.ids, std::ssize(drive.ids)) + " }");
+    }
+    out.motion(drive.velocity, drive.angular_velocity);
+  }
+}
+
+void write_boundary(Writer& out, const Case& c) {
+  out.section("[boundary]");
+  for (int i = 0; i < 2 * c.domain.dimension; ++i) {
+    const Face& face = c.faces[i];
+    if (face.type == FaceType::periodic) continue;
+    std::string text = fmt::format("{{ type = \"{}\"", name_of(face_type_names, face.type));
+    if (face.type == FaceType::fixed || face.type == FaceType::wall)
+      text += ", velocity = " + list_of(face.velocity, c.domain.dimension);
+    if (face.type == FaceType::wall) text += ", friction = " + text_of(face.friction);
+    out.raw(face_names[i], text + " }");
+  }
+}
+
+void write_schedule(Writer& out, std::string_view name, const Schedule& s, const std::string& more = {}) {
+  std::vector<std::string> parts;
+  if (s.every > 0) parts.push_back("every = " + text_of(s.every));
+  if (s.interval > 0) parts.push_back("interval = " + text_of(s.interval));
+  if (s.interval_wall > 0) parts.push_back("interval_wall = " + text_of(s.interval_wall));
+  if (!more.empty()) parts.push_back(more);
+  out.raw(name, parts.empty() ? "{}" : fmt::format("{{ {} }}", fmt::join(parts, ", ")));
+}
+
+void write_output(Writer& out, const Output& o) {
+  out.section("[output]");
+  write_schedule(out, "particles", o.particles,
+                 "fields = " + list_of(o.particles.fields, std::ssize(o.particles.fields)));
+  write_schedule(out, "grains", o.grains);
+  write_schedule(out, "contacts", o.contacts);
+  write_schedule(out, "history", o.history);
+  write_schedule(out, "checkpoint", o.checkpoint, "keep = " + text_of(o.checkpoint.keep));
+  out.raw("track", list_of(o.track, std::ssize(o.track)));
+}
+
+}  // namespace
+
+std::string write_case(const Draft& draft) {
+  const Case& c = draft.result;
+  Writer out(c.domain.dimension);
+  out.key("title", c.title);
+  write_domain(out, c.domain);
+  write_time_and_solver(out, c.time, c.solver);
+  write_contact(out, c);
+  write_bodies(out, draft);
+  write_boundary(out, c);
+  write_output(out, c.output);
+  return out.take();
+}
+
+}  // namespace cairn::reading

@@ -1,0 +1,65 @@
+#include "cairn/io/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+
+namespace cairn {
+
+namespace {
+
+constexpr double terminal_interval = 0.2, file_interval = 10.0;  // [s]
+
+/// h:mm:ss
+std::string format_duration(double seconds) {
+  if (!(seconds >= 0) || seconds > 1e9) return "?";
+  const auto all = static_cast<std::int64_t>(std::ceil(seconds));
+  return fmt::format("{}:{:02}:{:02}", all / 3600, all / 60 % 60, all % 60);
+}
+
+}  // namespace
+
+double estimate_wall_left(double fraction, double fraction_at_start, double wall) {
+  const double done = fraction - fraction_at_start;
+  return done > 0 && wall > 0 ? wall * (1.0 - fraction) / done : -1.0;
+}
+
+std::string format_progress(const Progress& p) {
+  return fmt::format(
+      "{:5.1f} %  t {:.4g} s  step {}  dt {:.3g} s  {} points  {:.3g} M point-steps/s/rank  energy error {:.2g}  left "
+      "{}",
+      100.0 * p.fraction, p.time, p.step, p.dt, p.points, 1e-6 * p.point_steps_per_second_rank, p.energy_error,
+      format_duration(p.wall_left));
+}
+
+ProgressDisplay::ProgressDisplay(std::FILE* stream) : ProgressDisplay(stream, ::isatty(::fileno(stream)) == 1) {}
+
+void ProgressDisplay::show(const Progress& progress, double wall) {
+  if (!due(wall)) return;
+  next_ = wall + (terminal_ ? terminal_interval : file_interval);
+  const std::string line = format_progress(progress);
+  if (terminal_) {
+    fmt::print(stream_, "\r{:<{}}", line, length_);  // blanks over what a longer line left
+    length_ = line.size();
+  } else {
+    fmt::print(stream_, "{}\n", line);
+  }
+  std::fflush(stream_);
+}
+
+void ProgressDisplay::finish() {
+  if (length_ == 0) return;
+  fmt::print(stream_, "\n");
+  std::fflush(stream_);
+  length_ = 0;
+}
+
+std::string format_summary(const RunSummary& s) {
+  const double rate = s.step_wall > 0 ? s.point_steps / s.step_wall : 0.0;
+  return fmt::format(
+      "done steps={} points={} time={} wall={:.3f} step_wall={:.3f} point_steps_per_s={:.6g} energy_error={} ranks={}",
+      s.steps, s.points, s.time, s.wall, s.step_wall, rate, s.energy_error, s.ranks);
+}
+
+}  // namespace cairn

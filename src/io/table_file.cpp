@@ -1,0 +1,111 @@
+#include "cairn/io/table_file.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/agreement.hpp"
+#include "table_writer.hpp"
+
+namespace cairn {
+
+namespace {
+
+/// Rows must be covered exactly once by all ranks together; blocks themselves are checked where they are written.
+void check_cover(const std::filesystem::path& file, MPI_Comm comm, const RowBlocks& rows) {
+  std::int64_t mine = rows.local_rows(), all = 0;
+  MPI_Allreduce(&mine, &all, 1, MPI_INT64_T, MPI_SUM, comm);
+  throw_together(comm, all == rows.total_rows ? ""
+                                              : fmt::format("cannot write {}: the ranks hold {} rows of {}",
+                                                            file.string(), all, rows.total_rows));
+}
+
+/// Bytes of all columns over all rows.
+std::int64_t bytes_of(std::span<const Column> columns, std::int64_t rows) {
+  std::int64_t bytes = 0;
+  for (const auto& column : columns) {
+    const std::size_t value = std::visit([](auto values) { return sizeof(values[0]); }, column.values);
+    bytes += rows * column.components * static_cast<std::int64_t>(value);
+  }
+  return bytes;
+}
+
+void write_column(TableWriter& writer, const std::string& path, const RowBlocks& rows, const Column& column) {
+  std::visit([&](auto values) { writer.write(path, column.components, rows, values); }, column.values);
+}
+
+void write_header(TableWriter& writer, const std::string& kind, const RowBlocks& rows, double time, std::int64_t step) {
+  writer.add_attribute("/", "kind", kind);
+  writer.add_attribute("/", "rows", rows.total_rows);
+  writer.add_attribute("/", "time", time);
+  writer.add_attribute("/", "step", step);
+}
+
+/// This rank's even share of `total` rows, for data that follow from the row number.
+RowBlocks even_share(MPI_Comm comm, std::int64_t total) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  const auto begin = [&](std::int64_t r) { return total / ranks * r + std::min<std::int64_t>(r, total % ranks); };
+  return {{{begin(rank), begin(rank + 1) - begin(rank)}}, total};
+}
+
+/// A grid of vertices: cell i has one point, point i.
+void write_vertices(TableWriter& writer, MPI_Comm comm, std::int64_t points) {
+  const RowBlocks one = even_share(comm, 1);
+  const std::vector<std::int64_t> number(static_cast<std::size_t>(one.local_rows()), points);
+  for (const char* name : {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"})
+    writer.write<std::int64_t>(fmt::format("VTKHDF/{}", name), 1, one, number);
+
+  const RowBlocks cells = even_share(comm, points), offsets = even_share(comm, points + 1);
+  std::vector<std::int64_t> count(static_cast<std::size_t>(cells.local_rows()));
+  std::iota(count.begin(), count.end(), cells.blocks[0].file_row);
+  writer.write<std::int64_t>("VTKHDF/Connectivity", 1, cells, count);
+  count.resize(static_cast<std::size_t>(offsets.local_rows()));
+  std::iota(count.begin(), count.end(), offsets.blocks[0].file_row);
+  writer.write<std::int64_t>("VTKHDF/Offsets", 1, offsets, count);
+  constexpr std::uint8_t vtk_vertex = 1;
+  const std::vector<std::uint8_t> types(static_cast<std::size_t>(cells.local_rows()), vtk_vertex);
+  writer.write<std::uint8_t>("VTKHDF/Types", 1, cells, types);
+}
+
+}  // namespace
+
+void write_vtkhdf(const std::filesystem::path& file, MPI_Comm comm, const RowBlocks& rows,
+                  std::span<const Column> columns, double time, std::int64_t step, const std::string& kind) {
+  const auto position =
+      std::find_if(columns.begin(), columns.end(), [](const Column& c) { return c.name == "position"; });
+  const bool has_points = position != columns.end() && position->components == 3 && position->values.index() == 0;
+  throw_together(comm,
+                 has_points ? "" : fmt::format("cannot write {}: no column position of 3 doubles", file.string()));
+  check_cover(file, comm, rows);
+
+  constexpr std::int64_t vertex_bytes = 2 * sizeof(std::int64_t) + sizeof(std::uint8_t);
+  TableWriter writer(file, comm, bytes_of(columns, rows.total_rows) + rows.total_rows * vertex_bytes);
+  write_header(writer, kind, rows, time, step);
+  writer.add_group("VTKHDF");
+  writer.add_group("VTKHDF/PointData");
+  const std::int64_t version[2] = {1, 0};
+  writer.add_attribute("VTKHDF", "Version", std::span<const std::int64_t>(version));
+  writer.add_attribute("VTKHDF", "Type", std::string("UnstructuredGrid"));
+  write_vertices(writer, comm, rows.total_rows);
+  for (const auto& column : columns) {
+    const std::string path = column.name == "position" ? "VTKHDF/Points" : "VTKHDF/PointData/" + column.name;
+    write_column(writer, path, rows, column);
+    writer.add_link(column.name, "/" + path);
+  }
+  writer.finish();
+}
+
+void write_table(const std::filesystem::path& file, MPI_Comm comm, const RowBlocks& rows,
+                 std::span<const Column> columns, double time, std::int64_t step, const std::string& kind) {
+  check_cover(file, comm, rows);
+  TableWriter writer(file, comm, bytes_of(columns, rows.total_rows));
+  write_header(writer, kind, rows, time, step);
+  for (const auto& column : columns) write_column(writer, column.name, rows, column);
+  writer.finish();
+}
+
+}  // namespace cairn

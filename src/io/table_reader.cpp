@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <cerrno>
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/agreement.hpp"
+#include "cairn/io/table_file.hpp"
+#include "table_writer.hpp"
+
+namespace cairn {
+
+using hdf5::Handle;
+
+struct TableReader::State {
+  std::filesystem::path file;
+  MPI_Comm comm;
+  Handle handle;
+  std::int64_t rows = 0, step = 0;
+  double time = 0;
+  std::string kind;
+
+  void require_input(const std::string& problem) const {
+    const std::string message = common_error(comm, problem.empty() ? "" : file.string() + ": " + problem);
+    if (!message.empty()) throw InputError(message);
+  }
+
+  template <class T>
+  void read(const std::string& column, int components, const RowBlocks& rows_wanted, std::span<T> values) const;
+};
+
+namespace {
+
+/// Whether the dataset has `rows` x `components` values; one component means one dimension.
+std::string check_shape(hid_t dataset, const std::string& column, std::int64_t rows, int components) {
+  const Handle space(H5Dget_space(dataset), H5Sclose);
+  hsize_t extent[H5S_MAX_RANK] = {0, 1};
+  const int dimensions = H5Sget_simple_extent_dims(space, extent, nullptr);
+  if (dimensions == (components == 1 ? 1 : 2) && extent[0] == static_cast<hsize_t>(rows) &&
+      (components == 1 || extent[1] == static_cast<hsize_t>(components)))
+    return {};
+  return fmt::format("column {} does not have {} rows of {} values", column, rows, components);
+}
+
+}  // namespace
+
+template <class T>
+void TableReader::State::read(const std::string& column, int components, const RowBlocks& wanted,
+                              std::span<T> values) const {
+  require_input(wanted.total_rows != rows ? fmt::format("it holds {} rows, not {}", rows, wanted.total_rows)
+                                          : check_rows(wanted, components, values.size()));
+  const bool exists = H5Lexists(handle, column.c_str(), H5P_DEFAULT) > 0;
+  const Handle dataset(exists ? H5Dopen2(handle, column.c_str(), H5P_DEFAULT) : H5I_INVALID_HID, H5Dclose);
+  require_input(dataset.valid() ? check_shape(dataset, column, rows, components) : "it has no column " + column);
+
+  errno = 0;
+  const Handle in_memory = memory_space(wanted.local_rows(), components), in_file = select_rows(wanted, components);
+  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose);
+  const bool ready = in_memory.valid() && in_file.valid() && H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE) >= 0;
+  throw_together(comm, ready ? "" : fmt::format("cannot read {}: {}", file.string(), hdf5::error_text()));
+  const bool good = H5Dread(dataset, hdf5::native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0;
+  throw_together(comm,
+                 good ? "" : fmt::format("cannot read {}: column {}: {}", file.string(), column, hdf5::error_text()));
+}
+
+TableReader::TableReader(const std::filesystem::path& file, MPI_Comm comm) : state_(std::make_unique<State>()) {
+  hdf5::silence();
+  state_->file = file;
+  state_->comm = comm;
+  std::error_code ignored;
+  state_->require_input(std::filesystem::is_regular_file(file, ignored) ? "" : "no such file");
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  errno = 0;
+  const bool prepared = H5Pset_fapl_mpio(access, comm, MPI_INFO_NULL) >= 0;
+  state_->require_input(prepared ? "" : hdf5::error_text());
+  state_->handle = Handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose);
+  state_->require_input(state_->handle.valid() ? "" : "not a whole HDF5 file: " + hdf5::error_text());
+  const Handle root(H5Gopen2(state_->handle, "/", H5P_DEFAULT), H5Gclose);
+  const bool complete =
+      hdf5::read_attribute(root, "rows", state_->rows) && hdf5::read_attribute(root, "time", state_->time) &&
+      hdf5::read_attribute(root, "step", state_->step) && hdf5::read_attribute(root, "kind", state_->kind);
+  state_->require_input(complete ? "" : "not a table of cairn: its root lacks rows, time, step or kind");
+}
+
+TableReader::~TableReader() = default;
+
+std::int64_t TableReader::rows() const { return state_->rows; }
+double TableReader::time() const { return state_->time; }
+std::int64_t TableReader::step() const { return state_->step; }
+const std::string& TableReader::kind() const { return state_->kind; }
+
+void TableReader::read(const std::string& column, int components, const RowBlocks& rows,
+                       std::span<double> values) const {
+  state_->read(column, components, rows, values);
+}
+
+void TableReader::read(const std::string& column, int components, const RowBlocks& rows,
+                       std::span<std::int32_t> values) const {
+  state_->read(column, components, rows, values);
+}
+
+void TableReader::read(const std::string& column, int components, const RowBlocks& rows,
+                       std::span<std::int64_t> values) const {
+  state_->read(column, components, rows, values);
+}
+
+}  // namespace cairn

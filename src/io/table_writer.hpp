@@ -1,0 +1,74 @@
+#pragma once
+/// One HDF5 file written by all ranks together, which appears under its name only when it is whole.
+
+#include "cairn/io/table_file.hpp"
+#include "hdf5.hpp"
+
+namespace cairn {
+
+/// File rows of a rank as a selection of a dataset of `total_rows` x `components` values; empty handle on failure.
+/// The selection is built by halves: adding the blocks one by one would take time quadratic in their number.
+hdf5::Handle select_rows(const RowBlocks& rows, int components);
+
+/// Space of `rows` x `components` values in memory, all selected.
+hdf5::Handle memory_space(std::int64_t rows, int components);
+
+/// What is wrong with this rank's blocks for a buffer of `size` values, or empty.
+std::string check_rows(const RowBlocks& rows, int components, std::size_t size);
+
+/// What the file system says about a failure to write: a full disk has no other clear sign through MPI-IO.
+std::string write_failure(const std::filesystem::path& file, const std::string& what, const std::string& reason);
+
+/// Flushes a file to disk and gives it its final name, replacing what was there; returns the error, empty if none.
+std::string publish(const std::filesystem::path& temporary, const std::filesystem::path& file);
+
+/// `.NAME.part` in the folder of `file`.
+std::filesystem::path temporary_name(const std::filesystem::path& file);
+
+/// Every member function is collective, and throws the same RunError on every rank if it fails on any. Destroyed before
+/// finish(), the writer removes what it wrote.
+///
+/// HDF5 (1.10) cannot close a file whose writing failed: the library then crashes or loops when the program ends. So
+/// the space is claimed from the file system before HDF5 writes anything, which finds a full disk, quota or limit
+/// early; should writing fail all the same, the file is cut to nothing first, so that HDF5 finds room for what it holds
+/// back.
+class TableWriter {
+ public:
+  /// `bytes`: of all datasets together, at least.
+  TableWriter(std::filesystem::path file, MPI_Comm comm, std::int64_t bytes);
+  ~TableWriter();
+  TableWriter(const TableWriter&) = delete;
+  TableWriter& operator=(const TableWriter&) = delete;
+
+  void add_group(const std::string& path);
+  void add_link(const std::string& path, const std::string& target);
+  void add_attribute(const std::string& object, const std::string& name, const hdf5::AttributeValue& value);
+
+  /// Writes a dataset of rows.total_rows (x components) values, each rank its own rows.
+  template <class T>
+  void write(const std::string& path, int components, const RowBlocks& rows, std::span<const T> values) {
+    write_rows(path, components, rows, hdf5::native_type<T>(), values.data(), values.size());
+  }
+
+  /// Flushes to disk and renames.
+  void finish();
+
+ private:
+  void write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type, const void* values,
+                  std::size_t size);
+  /// Throws on every rank if `good` is false on any; call it straight after the HDF5 call, with errno 0 before that.
+  void require(bool good, const std::string& what);
+  void create(std::int64_t bytes);
+  /// Closes and removes the unfinished file.
+  void discard();
+  /// Claims space on rank 0; throws on every rank if there is not enough.
+  void reserve(std::int64_t bytes, int mode);
+
+  std::filesystem::path file_, temporary_;
+  MPI_Comm comm_;
+  int rank_ = 0;
+  bool finished_ = false;
+  hdf5::Handle handle_;
+};
+
+}  // namespace cairn

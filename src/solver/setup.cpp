@@ -1,0 +1,245 @@
+#include "cairn/core/error.hpp"
+#include "cairn/parallel/distribution.hpp"
+#include "cairn/solver/simulation.hpp"
+
+#include <fmt/format.h>
+
+#include <numeric>
+#include <set>
+
+namespace cairn {
+namespace {
+
+template <int Dim>
+Vec<Dim> head(const Vec3& v) {
+  return v.head<Dim>();
+}
+
+template <int Dim>
+Lattice<Dim> make_lattice(const Domain& domain) {
+  Index<Dim> cells;
+  std::array<bool, Dim> periodic;
+  for (int d = 0; d < Dim; ++d) cells[d] = domain.cells[d], periodic[d] = domain.periodic[d];
+  return Lattice<Dim>(head<Dim>(domain.lower), head<Dim>(domain.upper), cells, periodic, domain.patch_cells);
+}
+
+SolverMaterial make_material(const Material& spec) {
+  SolverMaterial m{spec.name, make_law(spec.model, spec.parameters), spec.density, false, 0.0, {}};
+  std::visit(
+      [&](const auto& law) {
+        m.rigid = law.rigid;
+        m.state_names.assign(law.state_names.begin(), law.state_names.end());
+        Symmetric<3, double> stress{};
+        double state[8] = {};
+        m.longitudinal_modulus = law.update(Tensor<3, double>{}, Tensor<3, double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, 1.0, stress, state);
+      },
+      m.law);
+  return m;
+}
+
+/// True where the body reaches across a face of the domain.
+bool overlaps_face(const BodySpec& body, const Domain& domain, int face) {
+  const Bounds b = bounds(body.shape);
+  const int d = face / 2;
+  return face % 2 == 0 ? b.lower[d] < domain.lower[d] : b.upper[d] > domain.upper[d];
+}
+
+std::vector<Body> make_bodies(const Case& c, const std::vector<SolverMaterial>& materials) {
+  std::vector<Body> bodies;
+  for (const auto& spec : c.bodies)
+    bodies.push_back({spec.material, materials[spec.material].rigid, spec.velocity, spec.angular_velocity, centre(spec.shape)});
+  for (const auto& drive : c.drives) {
+    const std::set<int> ids(drive.ids.begin(), drive.ids.end());
+    for (std::size_t b = 0; b < bodies.size(); ++b) {
+      const bool chosen = drive.overlapping >= 0 ? overlaps_face(c.bodies[b], c.domain, drive.overlapping)
+                                                 : ids.count(static_cast<int>(b)) > 0 ||
+                                                       (!drive.group.empty() && c.bodies[b].group == drive.group);
+      if (!chosen) continue;
+      bodies[b].rigid = true;
+      bodies[b].velocity = drive.velocity;
+      bodies[b].angular_velocity = drive.angular_velocity;
+    }
+  }
+  return bodies;
+}
+
+template <int Dim>
+FaceConditions<Dim> make_faces(const Case& c) {
+  FaceConditions<Dim> faces;
+  for (int f = 0; f < 2 * Dim; ++f) {
+    const Face& face = c.faces[f];
+    faces[f].type = c.domain.periodic[f / 2] ? FaceType::periodic : face.type;
+    faces[f].velocity = head<Dim>(face.velocity);
+    faces[f].friction.assign(c.materials.size(), {ContactLaw::friction, face.friction});
+    for (const auto& pair : c.contact.pairs) {
+      const int material = std::max(pair.material_a, pair.material_b);
+      if (std::min(pair.material_a, pair.material_b) != -1 || material < 0) continue;
+      faces[f].friction[material] = {pair.law, pair.law == ContactLaw::frictionless ? 0.0 : pair.friction};
+    }
+  }
+  return faces;
+}
+
+/// Fills patches with the points of bodies: a square lattice of points in every cell, those inside the body's shape.
+template <int Dim>
+class Filler {
+ public:
+  Filler(const Case& c, const Lattice<Dim>& lattice, const std::vector<Body>& bodies, const std::vector<SolverMaterial>& materials)
+      : case_(c), lattice_(lattice), bodies_(bodies), materials_(materials),
+        per_direction_(static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / Dim)))),
+        bodies_of_(lattice.patch_count()) {
+    for (int b = 0; b < static_cast<int>(c.bodies.size()); ++b) list_images(b);
+  }
+
+  /// Calls f(body, position, image shift) for every point of the patch: by body, then by cell, then within the cell.
+  template <class F>
+  void for_points(int patch, F&& f) const {
+    for (const auto& placed : bodies_of_[patch]) {
+      const Shape& shape = case_.bodies[placed.body].shape;
+      const Box<Dim> cells = intersection(placed.cells, lattice_.patch_cells(patch));
+      Box<Dim> inside;
+      inside.upper.fill(per_direction_);
+      for_each(cells, [&](const Index<Dim>& cell) {
+        for_each(inside, [&](const Index<Dim>& sub) {
+          Vec3 x = Vec3::Zero();
+          for (int d = 0; d < Dim; ++d)
+            x[d] = lattice_.lower()[d] + (cell[d] + (sub[d] + 0.5) / per_direction_) * lattice_.spacing()[d];
+          if (contains(shape, x - placed.shift)) f(placed.body, x, placed.shift);
+        });
+      });
+    }
+  }
+
+  void fill(Patch<Dim>& patch, std::int64_t first_id) const {
+    using C = PointColumns<Dim>;
+    const double volume = lattice_.cell_volume() / std::pow(per_direction_, Dim);
+    for_points(patch.id, [&](int b, const Vec3& x, const Vec3& shift) {
+      const Body& body = bodies_[b];
+      const auto& spec = case_.bodies[b];
+      auto& points = patch.piece_of(b, static_cast<int>(materials_[body.material].state_names.size())).points;
+      const int p = points.size();
+      points.resize(p + 1);
+      const Vec3 omega = body.rigid ? body.angular_velocity : spec.angular_velocity;
+      const Vec3 v = (body.rigid ? body.velocity : spec.velocity) + omega.cross(x - shift - body.centre);
+      for (int c = 0; c < points.columns(); ++c) points.column(c)[p] = 0;
+      for (int i = 0; i < 3; ++i) points.column(C::deformation + tensor_index<Dim>(i, i))[p] = 1;
+      Image image{};
+      for (int d = 0; d < Dim; ++d) {
+        points.column(d)[p] = x[d];
+        points.column(C::velocity + d)[p] = v[d];
+        image[d] = static_cast<std::int16_t>(-std::lround(shift[d] / lattice_.length(d)));
+      }
+      points.column(C::volume)[p] = volume;
+      points.ids()[p] = first_id++;
+      points.images()[p] = image;
+    });
+  }
+
+ private:
+  struct Placed {
+    int body;
+    Vec3 shift;       // of the image that reaches here
+    Box<Dim> cells;   // that its bounds touch
+  };
+
+  /// Lists the patches that a body and its periodic images touch.
+  void list_images(int b) {
+    const Bounds all = bounds(case_.bodies[b].shape);
+    Box<Dim> images;
+    for (int d = 0; d < Dim; ++d) images.lower[d] = lattice_.periodic(d) ? -1 : 0, images.upper[d] = lattice_.periodic(d) ? 2 : 1;
+    for_each(images, [&](const Index<Dim>& image) {
+      Placed placed{b, Vec3::Zero(), {}};
+      for (int d = 0; d < Dim; ++d) {
+        placed.shift[d] = image[d] * lattice_.length(d);
+        const double low = lattice_.scaled(d, all.lower[d] + placed.shift[d]), high = lattice_.scaled(d, all.upper[d] + placed.shift[d]);
+        placed.cells.lower[d] = static_cast<int>(std::floor(std::clamp(low, 0.0, double(lattice_.cells()[d]))));
+        placed.cells.upper[d] = static_cast<int>(std::ceil(std::clamp(high, 0.0, double(lattice_.cells()[d]))));
+      }
+      if (placed.cells.empty()) return;
+      Index<Dim> last = placed.cells.upper;
+      for (auto& i : last) --i;
+      const auto from = lattice_.patch_position(lattice_.patch_of_cell(placed.cells.lower));
+      auto to = lattice_.patch_position(lattice_.patch_of_cell(last));
+      for (auto& i : to) ++i;
+      for_each(Box<Dim>{from, to}, [&](const Index<Dim>& position) { bodies_of_[lattice_.patch_at(position)].push_back(placed); });
+    });
+  }
+
+  const Case& case_;
+  const Lattice<Dim>& lattice_;
+  const std::vector<Body>& bodies_;
+  const std::vector<SolverMaterial>& materials_;
+  int per_direction_;
+  std::vector<std::vector<Placed>> bodies_of_;  // for each patch, ascending in body
+};
+
+/// \throws InputError on every rank where a body got no point at all
+void check_bodies(const Case& c, std::vector<std::int64_t>& points_of_body, MPI_Comm comm) {
+  MPI_Allreduce(MPI_IN_PLACE, points_of_body.data(), static_cast<int>(points_of_body.size()), MPI_INT64_T, MPI_SUM, comm);
+  std::vector<std::string> errors;
+  for (std::size_t b = 0; b < points_of_body.size(); ++b)
+    if (points_of_body[b] == 0 && errors.size() < 20)
+      errors.push_back(fmt::format("{}: body {} holds no material point: it is smaller than the spacing of the points or lies "
+                                   "outside the domain; use smaller cells or more points per cell",
+                                   c.bodies[b].source, b));
+  if (!errors.empty()) throw InputError(errors);
+}
+
+}  // namespace
+
+template <int Dim>
+Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
+    : comm_(comm), solver_(c.solver), limits_(c.time), lattice_(make_lattice<Dim>(c.domain)),
+      transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))), faces_(make_faces<Dim>(c)) {
+  MPI_Comm_rank(comm_, &rank_);
+  MPI_Comm_size(comm_, &ranks_);
+  std::vector<ContactMaterial> contact_materials;
+  for (const auto& spec : c.materials) {
+    materials_.push_back(make_material(spec));
+    contact_materials.push_back({materials_.back().longitudinal_modulus});
+    speeds_.wave = std::max(speeds_.wave, std::sqrt(materials_.back().longitudinal_modulus / spec.density));
+  }
+  std::array<FaceType, 6> types{};
+  for (int f = 0; f < 2 * Dim; ++f) types[f] = faces_[f].type;
+  contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, types);
+  bodies_ = make_bodies(c, materials_);
+
+  // Each rank counts the points of some patches; then every rank knows all counts and deals the patches out alike.
+  const Filler<Dim> filler(c, lattice_, bodies_, materials_);
+  std::vector<std::int64_t> count(lattice_.patch_count(), 0), of_body(bodies_.size(), 0);
+  for (int patch = rank_; patch < lattice_.patch_count(); patch += ranks_)
+    filler.for_points(patch, [&](int body, const Vec3&, const Vec3&) { ++count[patch], ++of_body[body]; });
+  MPI_Allreduce(MPI_IN_PLACE, count.data(), static_cast<int>(count.size()), MPI_INT64_T, MPI_SUM, comm_);
+  check_bodies(c, of_body, comm_);
+  total_points_ = std::accumulate(count.begin(), count.end(), std::int64_t{0});
+  owner_ = distribute_patches(lattice_, count, ranks_, c.partition);
+
+  std::set<int> neighbours;
+  std::int64_t first_id = 0;
+  for (int patch = 0; patch < lattice_.patch_count(); first_id += count[patch], ++patch) {
+    if (owner_[patch] != rank_) continue;
+    patches_.emplace_back(patch, lattice_);
+    filler.fill(patches_.back(), first_id);
+    for (const auto& link : patches_.back().links) neighbours.insert(owner_[link.patch]);
+  }
+  neighbours.erase(rank_);
+  sweeps_.resize(patches_.size());
+  walls_.resize(patches_.size());
+  messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
+  exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_);
+  migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_);
+
+  for_pieces([&](Piece<Dim>& piece) {
+    for (int p = 0; p < piece.points.size(); ++p) {
+      double squared = 0;
+      for (int d = 0; d < Dim; ++d) squared += std::pow(piece.points.column(PointColumns<Dim>::velocity + d)[p], 2);
+      speeds_.point = std::max(speeds_.point, std::sqrt(squared));
+    }
+  });
+  start_speed_reduction();
+}
+
+template Simulation<2>::Simulation(const Case&, MPI_Comm);
+template Simulation<3>::Simulation(const Case&, MPI_Comm);
+
+}  // namespace cairn

@@ -1,0 +1,219 @@
+#include "cairn/solver/simulation.hpp"
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/agreement.hpp"
+
+#include <fmt/format.h>
+
+namespace cairn {
+namespace {
+
+/// Points are sorted by cell again after so many steps.
+constexpr std::int64_t sort_interval = 50;
+
+}  // namespace
+
+template <int Dim>
+void Simulation<Dim>::step(double longest) {
+  const StressUpdate update = solver_.stress_update;
+  const bool first = update == StressUpdate::first || update == StressUpdate::both;
+  const bool again = update == StressUpdate::both || update == StressUpdate::modified_last;
+  const double share = update == StressUpdate::both ? 0.5 : 1.0;
+
+  choose_time_step(longest);
+  project_points();
+  contact_before_update();
+  if (first) strain_first(share);
+  contact_after_update();
+  accelerate_points(again);
+  if (again) project_again();
+  if (update != StressUpdate::first) strain_last(share);
+  move_points();
+  migrate_points();
+  time_ += dt_;
+  ++steps_;
+}
+
+template <int Dim>
+void Simulation<Dim>::choose_time_step(double longest) {
+  finish_speed_reduction();
+  dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * lattice_.smallest_spacing() / (speed_result_[0] + speed_result_[1]);
+  if (!(dt_ > 0) || !std::isfinite(dt_))
+    throw RunError(fmt::format("step {}: the time step collapsed (wave speed {} m/s, point speed {} m/s)", steps_ + 1,
+                               speed_result_[0], speed_result_[1]));
+  // Reach the end exactly, without a last step of a rounding error's length.
+  if (dt_ * (1 + 1e-9) >= longest) dt_ = longest;
+}
+
+template <int Dim>
+void Simulation<Dim>::project_points() {
+  {
+    const auto time = timers_.measure(Stage::project);
+    for_pieces([&](Piece<Dim>& piece) { lay_out_nodes(piece, lattice_, transfer_); });
+  }
+  const auto project_where = [&](bool shared) {
+    const auto time = timers_.measure(Stage::project);
+    for (auto& patch : patches_)
+      for (auto& piece : patch.pieces)
+        if (NodeExchange<Dim>::shares_nodes(patch, piece) == shared)
+          project(piece, lattice_, transfer_, material_of(piece).density);
+  };
+  project_where(true);
+  {
+    const auto time = timers_.measure(Stage::exchange);
+    exchange_->start_sums(patches_, transfer_.extras);
+  }
+  project_where(false);
+  const auto time = timers_.measure(Stage::exchange);
+  exchange_->finish_sums(patches_);
+  for (auto& patch : patches_) mirror_sums(patch, lattice_, faces_);
+}
+
+template <int Dim>
+void Simulation<Dim>::contact_before_update() {
+  const auto time = timers_.measure(Stage::contact);
+  for (std::size_t p = 0; p < patches_.size(); ++p) {
+    sweeps_[p].find(patches_[p], lattice_, contact_, bodies_);
+    walls_[p].find(patches_[p], lattice_, faces_, contact_, sweeps_[p], bodies_);
+    sweeps_[p].first_pass(patches_[p], lattice_, contact_, dt_);
+    walls_[p].first_pass(patches_[p], faces_, contact_, dt_);
+  }
+}
+
+template <int Dim>
+void Simulation<Dim>::strain_first(double share) {
+  {
+    const auto time = timers_.measure(Stage::stress);
+    for (auto& patch : patches_) {
+      for (auto& piece : patch.pieces) velocity_from_sums(piece);
+      constrain_velocity(patch, lattice_, faces_, bodies_);
+      for (auto& piece : patch.pieces) {
+        const auto& material = material_of(piece);
+        if (is_rigid(piece)) std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
+        else update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
+      }
+    }
+  }
+  const auto time = timers_.measure(Stage::exchange);
+  exchange_->sum(patches_, &NodeBox<Dim>::force);
+  for (auto& patch : patches_) mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::force);
+}
+
+template <int Dim>
+void Simulation<Dim>::contact_after_update() {
+  {
+    const auto time = timers_.measure(Stage::contact);
+    for (std::size_t p = 0; p < patches_.size(); ++p) {
+      sweeps_[p].second_pass(patches_[p], lattice_, contact_, dt_);
+      walls_[p].second_pass(patches_[p], faces_, contact_, dt_);
+    }
+  }
+  const auto time = timers_.measure(Stage::integrate);
+  for_pieces([&](Piece<Dim>& piece) { integrate(piece, dt_); });
+  for (auto& patch : patches_) constrain_motion(patch, lattice_, faces_, bodies_, dt_);
+}
+
+template <int Dim>
+void Simulation<Dim>::accelerate_points(bool again) {
+  const auto time = timers_.measure(Stage::update);
+  for_pieces([&](Piece<Dim>& piece) {
+    const double density = material_of(piece).density;
+    if (is_rigid(piece)) {
+      if (again) project_momentum(piece, lattice_, transfer_, density);
+    } else if (again) {
+      accelerate_and_project(piece, lattice_, transfer_, density, dt_);
+    } else {
+      accelerate(piece, lattice_, transfer_, dt_);
+    }
+  });
+}
+
+template <int Dim>
+void Simulation<Dim>::project_again() {
+  {
+    const auto time = timers_.measure(Stage::exchange);
+    exchange_->sum(patches_, &NodeBox<Dim>::velocity);
+    for (auto& patch : patches_) mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::velocity);
+  }
+  const auto time = timers_.measure(Stage::contact);
+  for (std::size_t p = 0; p < patches_.size(); ++p) {
+    sweeps_[p].repeat_pass(patches_[p], lattice_, contact_, dt_);
+    walls_[p].repeat_pass(patches_[p], faces_, contact_);
+  }
+  for_pieces([&](Piece<Dim>& piece) { velocity_from_momentum(piece); });
+  for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_);
+}
+
+template <int Dim>
+void Simulation<Dim>::strain_last(double share) {
+  const auto time = timers_.measure(Stage::stress);
+  for_pieces([&](Piece<Dim>& piece) {
+    if (solver_.stress_update == StressUpdate::last) velocity_from_motion(piece);
+    const auto& material = material_of(piece);
+    if (!is_rigid(piece)) update_stress(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
+  });
+}
+
+template <int Dim>
+void Simulation<Dim>::move_points() {
+  const auto time = timers_.measure(Stage::update);
+  for_pieces([&](Piece<Dim>& piece) {
+    if (is_rigid(piece)) move_rigid(piece);
+    else move(piece, lattice_, transfer_, dt_, speeds_);
+  });
+}
+
+/// Points of a rigid body turn about its centre, which moves with the body's velocity.
+template <int Dim>
+void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
+  using C = PointColumns<Dim>;
+  const Body& body = bodies_[piece.body];
+  Points<Dim>& points = piece.points;
+  const double speed = body.angular_velocity.norm();
+  const Vec3 axis = speed > 0 ? Vec3(body.angular_velocity / speed) : Vec3::UnitZ();
+  const Mat3 turn = Eigen::AngleAxisd(speed * dt_, axis).toRotationMatrix();
+  const Vec3 centre = body.centre + time_ * body.velocity;
+  for (int p = 0; p < points.size(); ++p) {
+    Vec3 arm = Vec3::Zero();
+    for (int d = 0; d < Dim; ++d) arm[d] = points.column(d)[p] + points.images()[p][d] * lattice_.length(d) - centre[d];
+    const Vec3 turned = speed > 0 ? Vec3(turn * arm) : arm;
+    const Vec3 velocity = body.velocity + body.angular_velocity.cross(turned);
+    for (int d = 0; d < Dim; ++d) {
+      points.column(d)[p] += dt_ * body.velocity[d] + turned[d] - arm[d];
+      points.column(C::velocity + d)[p] = velocity[d];
+    }
+    speeds_.point = std::max(speeds_.point, velocity.norm());
+  }
+}
+
+template <int Dim>
+void Simulation<Dim>::migrate_points() {
+  const auto time = timers_.measure(Stage::migrate);
+  migration_->start(patches_, lattice_);
+  start_speed_reduction();
+  migration_->finish(patches_);
+  if ((steps_ + 1) % sort_interval == 0)
+    for (auto& patch : patches_)
+      for (auto& piece : patch.pieces) sort_by_cell(piece, lattice_, patch.cells);
+}
+
+template <int Dim>
+void Simulation<Dim>::start_speed_reduction() {
+  speed_message_[0] = speeds_.wave, speed_message_[1] = speeds_.point;
+  speed_message_[2] = migration_->failure().empty() ? 0 : 1;
+  MPI_Iallreduce(speed_message_, speed_result_, 3, MPI_DOUBLE, MPI_MAX, comm_, &speed_request_);
+  speeds_ = {};
+}
+
+template <int Dim>
+void Simulation<Dim>::finish_speed_reduction() {
+  if (speed_request_ == MPI_REQUEST_NULL) return;
+  MPI_Wait(&speed_request_, MPI_STATUS_IGNORE);
+  if (speed_result_[2] > 0)
+    throw RunError(fmt::format("step {}: {}", steps_, common_error(comm_, migration_->failure())));
+}
+
+template class Simulation<2>;
+template class Simulation<3>;
+
+}  // namespace cairn

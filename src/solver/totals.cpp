@@ -1,0 +1,84 @@
+#include "cairn/solver/simulation.hpp"
+
+#include <map>
+
+namespace cairn {
+namespace {
+
+constexpr int sum_count = 11;
+using Sums = std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass, nodes
+
+/// One point's deformation gradient.
+template <int Dim>
+Tensor<Dim, double> deformation_of(const Points<Dim>& points, int p) {
+  Tensor<Dim, double> F;
+  for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(PointColumns<Dim>::deformation + i)[p];
+  return F;
+}
+
+template <int Dim>
+void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, const Vec<Dim>& gravity, Sums& sums) {
+  using C = PointColumns<Dim>;
+  const SolverMaterial& material = simulation.material_of(piece);
+  const Points<Dim>& points = piece.points;
+  std::visit(
+      [&](const auto& law) {
+        std::array<double, 8> state{};
+        for (int p = 0; p < points.size(); ++p) {
+          const double volume = points.column(C::volume)[p], mass = material.density * volume;
+          sums[9] += mass;
+          if (simulation.is_rigid(piece)) continue;
+          for (int s = 0; s < points.columns() - C::state; ++s) state[s] = points.column(C::state + s)[p];
+          double squared = 0, height = 0;
+          for (int d = 0; d < Dim; ++d) {
+            const double v = points.column(C::velocity + d)[p];
+            squared += v * v;
+            height += gravity[d] * (points.column(d)[p] + points.images()[p][d] * simulation.lattice().length(d));
+            sums[6 + d] += mass * v;
+          }
+          sums[0] += 0.5 * mass * squared;
+          sums[1] += volume * law.strain_energy(deformation_of(points, p), state.data());
+          sums[2] -= mass * height;
+          sums[3] += volume * law.plastic_work(state.data());
+        }
+      },
+      material.law);
+}
+
+}  // namespace
+
+template <int Dim>
+Totals Simulation<Dim>::totals() const {
+  // Partial sums of every patch go to rank 0, which adds them in patch order.
+  std::vector<double> mine;
+  for (const auto& patch : patches_) {
+    Sums sums{};
+    for (const auto& piece : patch.pieces) add_piece(*this, piece, transfer_.gravity, sums);
+    sums[4] = patch.ledger.contact_dissipation, sums[5] = patch.ledger.boundary_work;
+    sums[10] = static_cast<double>(patch.ledger.contact_nodes);
+    mine.push_back(patch.id);
+    mine.insert(mine.end(), sums.begin(), sums.end());
+  }
+  std::vector<int> counts(ranks_), starts(ranks_, 0);
+  const int count = static_cast<int>(mine.size());
+  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm_);
+  for (int r = 1; r < ranks_; ++r) starts[r] = starts[r - 1] + counts[r - 1];
+  std::vector<double> all(rank_ == 0 ? starts.back() + counts.back() : 0);
+  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm_);
+  std::map<int, const double*> by_patch;
+  for (std::size_t i = 0; i < all.size(); i += 1 + sum_count) by_patch[static_cast<int>(all[i])] = &all[i + 1];
+  Sums sums{};
+  for (const auto& [patch, values] : by_patch)
+    for (int i = 0; i < sum_count; ++i) sums[i] += values[i];
+  Totals t;
+  t.kinetic = sums[0], t.strain = sums[1], t.potential = sums[2], t.plastic = sums[3];
+  t.contact_dissipation = sums[4], t.boundary_work = sums[5];
+  t.momentum = Vec3(sums[6], sums[7], sums[8]);
+  t.mass = sums[9], t.contact_nodes = sums[10];
+  return t;
+}
+
+template Totals Simulation<2>::totals() const;
+template Totals Simulation<3>::totals() const;
+
+}  // namespace cairn

@@ -1,0 +1,494 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <random>
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/case.hpp"
+#include "cairn/io/pack_spec.hpp"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::string base = R"([domain]
+upper = [1.0, 1.0]
+cells = [20, 10]
+[time]
+end = 0.1
+[materials.soft]
+model = "neo_hookean"
+density = 1000.0
+shear_modulus = 1.0e5
+bulk_modulus = 2.0e5
+[[bodies]]
+shape = { type = "disk", centre = [0.5, 0.5], radius = 0.2 }
+material = "soft"
+)";
+
+std::string replaced(std::string text, const std::string& old, const std::string& with) {
+  const auto at = text.find(old);
+  EXPECT_NE(at, std::string::npos) << old;
+  return at == std::string::npos ? text : text.replace(at, old.size(), with);
+}
+
+/// A folder of its own for each test.
+class CaseFile : public ::testing::Test {
+ protected:
+  CaseFile()
+      : folder_(fs::temp_directory_path() /
+                fmt::format("cairn_case_{}_{}", getpid(),
+                            ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::create_directories(folder_);
+  }
+  ~CaseFile() override { fs::remove_all(folder_); }
+
+  fs::path write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name, std::ios::binary) << text;
+    return folder_ / name;
+  }
+  Case read(const std::string& text, const std::vector<Override>& overrides = {}) const {
+    return read_case(write("case.toml", text), overrides);
+  }
+  /// The error lines of a wrong case, without the folder.
+  std::vector<std::string> errors(const std::string& text, const std::vector<Override>& overrides = {}) const {
+    try {
+      read(text, overrides);
+    } catch (const InputError& error) {
+      auto lines = error.messages();
+      for (auto& line : lines)
+        if (line.starts_with(folder_.string())) line.erase(0, folder_.string().size() + 1);
+      return lines;
+    }
+    return {};
+  }
+  void expect_error(const std::string& text, const std::string& start, const std::string& remedy,
+                    const std::vector<Override>& overrides = {}) const {
+    const auto lines = errors(text, overrides);
+    ASSERT_EQ(lines.size(), 1u) << start << "\n" << fmt::format("{}", fmt::join(lines, "\n"));
+    EXPECT_TRUE(lines[0].starts_with(start)) << lines[0] << "\nexpected " << start;
+    EXPECT_NE(lines[0].find(remedy), std::string::npos) << lines[0] << "\nexpected " << remedy;
+  }
+  fs::path folder_;
+};
+
+TEST_F(CaseFile, FillsInTheDefaults) {
+  const Case c = read(base);
+  EXPECT_EQ(c.title, "");
+  EXPECT_EQ(c.domain.dimension, 2);
+  EXPECT_EQ(c.domain.lower, Vec3::Zero());
+  EXPECT_EQ(c.domain.cells, (std::array{20, 10, 1}));
+  EXPECT_EQ(c.domain.periodic, (std::array{false, false, false}));
+  EXPECT_EQ(c.domain.patch_cells, 32);
+  EXPECT_EQ(c.time.cfl, 0.4);
+  EXPECT_EQ(c.time.dt, 0);
+  EXPECT_EQ(c.time.steps, std::numeric_limits<std::int64_t>::max());
+  EXPECT_EQ(c.solver.shape, ShapeFunction::gimp);
+  EXPECT_EQ(c.solver.stress_update, StressUpdate::both);
+  EXPECT_EQ(c.solver.points_per_cell, 4);
+  EXPECT_EQ(c.contact.law, ContactLaw::friction);
+  EXPECT_EQ(c.contact.release, Release::reaction);
+  EXPECT_EQ(c.contact.friction, 0.3);
+  EXPECT_EQ(c.contact.fill, 0.8);
+  EXPECT_EQ(c.contact.normals, NormalSource::volume_gradient);
+  EXPECT_TRUE(c.contact.pairs.empty());
+  EXPECT_EQ(c.faces[0].type, FaceType::free);
+  EXPECT_EQ(c.output.history.every, 10);
+  EXPECT_FALSE(c.output.particles.active());
+  EXPECT_EQ(c.output.particles.fields,
+            (std::vector<std::string>{"velocity", "stress", "body", "id", "volume", "mass"}));
+  EXPECT_EQ(c.output.checkpoint.keep, 2);
+  EXPECT_EQ(c.bodies.at(0).source, (folder_ / "case.toml").string() + ":11");
+  EXPECT_TRUE(c.warnings.empty());
+}
+
+TEST_F(CaseFile, ResolvedTextReadsBackToTheSameCase) {
+  write("pack.csv", "x,y,r,group\n0.9,0.9,0.1,corner\n0.1,0.9,0.1,\n");
+  const Case c = read(R"(title = "quotes \" and \\ and \n"
+[domain]
+lower = [-0.1, 0.0]
+upper = [1.0, 1.0]
+cell_size = [0.05, 0.1]
+periodic = [false, true]
+gravity = [0.0, -9.81]
+patch_cells = 8
+[time]
+end = 0.1
+steps = 12
+dt = 1.0e-5
+[solver]
+shape = "linear"
+stress_update = "modified_last"
+flip = 0.95
+points_per_cell = 9
+[contact]
+law = "stick"
+release = "traction"
+fill = 0.0
+impulse_limit = 0.5
+normals = "density"
+normal_choice = "own"
+gate = "body"
+departing_friction = "printed"
+passes = "after"
+separation = 0.8
+[[contact.pair]]
+materials = ["wall", "z"]
+friction = inf
+[[contact.pair]]
+materials = ["z", "a b"]
+law = "frictionless"
+[materials.z]
+model = "von_mises"
+density = 1900.0
+youngs_modulus = 7.0e9
+poissons_ratio = 0.3
+yield_stress = 0.3e9
+[materials."a b"]
+model = "rigid"
+density = 1.0
+[[bodies]]
+shape = { type = "difference", of = [ { type = "box", lower = [0.3, 0.2], upper = [0.7, 0.8], angle = 0.1 }, { type = "ellipse", centre = [0.5, 0.5], radii = [0.1, 0.2] } ] }
+material = "z"
+velocity = [0.1, -0.2]
+angular_velocity = 0.3
+group = "g"
+[[bodies]]
+shape = { type = "polygon", points = [[0, 0.2], [0.3, 0.2], [0.1, 0.4]] }
+material = "a b"
+[[grains]]
+file = "pack.csv"
+material = "z"
+velocity = [3.0, 4.0]
+[[drive]]
+ids = [1, 2]
+velocity = [0.0, 1.0]
+[[drive]]
+bodies = { group = "corner" }
+[[drive]]
+group = "g"
+[boundary]
+left = { type = "fixed", velocity = [0.0, 1.0] }
+right = { type = "wall", friction = inf }
+[output]
+particles = { every = 3, interval = 0.1, fields = ["position", "image"] }
+history = {}
+checkpoint = { interval_wall = 600, keep = 5 }
+track = [2, 0]
+)");
+  const Case again = read_case(write("again.toml", c.resolved));
+  EXPECT_EQ(c.resolved, again.resolved);
+  // The text holds all of the case, so that it is enough to see that what was read is right.
+  EXPECT_EQ(c.title, "quotes \" and \\ and \n");
+  EXPECT_EQ(again.title, c.title);
+  EXPECT_EQ(again.domain.cells, (std::array{22, 10, 1}));
+  EXPECT_EQ(again.time.dt, 1.0e-5);
+  EXPECT_EQ(again.contact.departing_friction, DepartingFriction::printed);
+  ASSERT_EQ(again.contact.pairs.size(), 2u);
+  EXPECT_EQ(again.contact.pairs[0].material_a, -1);
+  EXPECT_EQ(again.contact.pairs[0].law, ContactLaw::friction);
+  EXPECT_EQ(again.contact.pairs[0].friction, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(again.contact.pairs[1].law, ContactLaw::frictionless);
+  EXPECT_EQ(again.contact.pairs[1].friction, 0.3);
+  ASSERT_EQ(again.materials.size(), 2u);
+  EXPECT_EQ(again.materials[0].name, "z") << "materials keep the order of the file";
+  EXPECT_EQ(again.materials[0].parameters, c.materials[0].parameters);
+  EXPECT_DOUBLE_EQ(again.materials[0].parameters.at("shear_modulus"), 7.0e9 / 2.6);
+  EXPECT_DOUBLE_EQ(again.materials[0].parameters.at("bulk_modulus"), 7.0e9 / 1.2);
+  EXPECT_EQ(again.materials[0].parameters.at("hardening_modulus"), 0.0);
+  ASSERT_EQ(again.bodies.size(), 4u);
+  EXPECT_EQ(std::get<BoxShape>(std::get<Compound>(again.bodies[0].shape).of[0]).angle, 0.1);
+  EXPECT_EQ(again.bodies[0].angular_velocity, Vec3(0, 0, 0.3));
+  EXPECT_EQ(again.bodies[1].material, 1);
+  EXPECT_EQ(again.bodies[2].velocity, Vec3(3, 4, 0));
+  EXPECT_EQ(again.bodies[2].group, "corner");
+  EXPECT_EQ(again.bodies[3].source, (folder_ / "pack.csv").string() + ":3");
+  ASSERT_EQ(again.drives.size(), 3u);
+  EXPECT_EQ(again.drives[0].ids, (std::vector{1, 2}));
+  EXPECT_EQ(again.drives[2].group, "g");
+  EXPECT_EQ(again.faces[0].velocity, Vec3(0, 1, 0));
+  EXPECT_EQ(again.faces[2].type, FaceType::periodic);
+  EXPECT_FALSE(again.output.history.active());
+  EXPECT_EQ(again.output.particles.fields, std::vector<std::string>{"image"});
+  EXPECT_EQ(again.output.track, (std::vector{2, 0}));
+}
+
+TEST_F(CaseFile, ResolvedTextReadsBackIn3D) {
+  const Case c = read(R"([domain]
+dimension = 3
+upper = [1.0, 1.0, 2.0]
+cell_size = 0.1
+[time]
+steps = 5
+[materials.m]
+model = "hypoelastic"
+density = 1
+shear_modulus = 1
+bulk_modulus = 1
+[[bodies]]
+shape = { type = "intersection", of = [ { type = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.3 }, { type = "half_space", point = [0.5, 0.5, 0.5], normal = [0, 0, 1] } ] }
+material = "m"
+angular_velocity = [1.0, 2.0, 3.0]
+[[bodies]]
+shape = { type = "union", of = [ { type = "cylinder", from = [0.5, 0.5, 1.0], to = [0.5, 0.5, 1.5], radius = 0.2 }, { type = "ellipsoid", centre = [0.5, 0.5, 1.5], radii = [0.2, 0.2, 0.1] }, { type = "box", lower = [0.1, 0.1, 1], upper = [0.3, 0.3, 1.2] } ] }
+material = "m"
+[[drive]]
+ids = [1]
+angular_velocity = [0, 0, 1]
+)");
+  EXPECT_EQ(c.domain.patch_cells, 16);
+  EXPECT_EQ(c.solver.points_per_cell, 8);
+  EXPECT_EQ(c.domain.cells, (std::array{10, 10, 20}));
+  const Case again = read_case(write("again.toml", c.resolved));
+  EXPECT_EQ(c.resolved, again.resolved);
+  EXPECT_EQ(again.bodies[0].angular_velocity, Vec3(1, 2, 3));
+  EXPECT_EQ(std::get<Cylinder>(std::get<Compound>(again.bodies[1].shape).of[0]).to, Vec3(0.5, 0.5, 1.5));
+}
+
+TEST_F(CaseFile, NumbersRoundTripBitForBit) {
+  std::mt19937_64 random(7);
+  std::string text = base;
+  for (int i = 0; i < 200; ++i) {
+    const double v =
+        std::ldexp(std::uniform_real_distribution(-1.0, 1.0)(random), static_cast<int>(random() % 1200) - 600);
+    text += fmt::format(
+        "[[bodies]]\nshape = {{ type = \"disk\", centre = [0.5, 0.5], radius = 0.1 }}\nmaterial = \"soft\"\n"
+        "velocity = [{:.25e}, -0.0]\n",
+        v);
+  }
+  const Case c = read(text);
+  const Case again = read_case(write("again.toml", c.resolved));
+  for (std::size_t i = 0; i < c.bodies.size(); ++i) EXPECT_EQ(c.bodies[i].velocity.x(), again.bodies[i].velocity.x());
+  EXPECT_TRUE(std::signbit(again.bodies.back().velocity.y()));
+}
+
+TEST_F(CaseFile, OverridesAreApplied) {
+  const Case c = read(base, {{"contact.friction", "0.5"},
+                             {"time.steps", "100"},
+                             {"bodies.0.velocity", "[1.0, 2.0]"},
+                             {"bodies.0.shape.radius", "0.1"},
+                             {"domain.cell_size", "0.1"},
+                             {"output.checkpoint", "{ every = 20 }"},
+                             {"title", "\"a\""},
+                             {"title", "\"b\""}});
+  EXPECT_EQ(c.contact.friction, 0.5);
+  EXPECT_EQ(c.time.steps, 100);
+  EXPECT_EQ(c.bodies[0].velocity, Vec3(1, 2, 0));
+  EXPECT_EQ(std::get<Ball>(c.bodies[0].shape).radius, 0.1);
+  EXPECT_EQ(c.domain.cells, (std::array{10, 10, 1})) << "an override of cell_size wins over cells";
+  EXPECT_EQ(c.output.checkpoint.every, 20);
+  EXPECT_EQ(c.title, "b");
+}
+
+TEST_F(CaseFile, ErrorsOfOverridesNameThem) {
+  expect_error(base, "--set time.end: -1 is out of range", "greater than 0", {{"time.end", "-1"}});
+  expect_error(base, "--set bodies.0.velocity: has 3 entries", "2 numbers", {{"bodies.0.velocity", "[1, 2, 3]"}});
+  expect_error(base, "--set bodies.1.velocity: '1' is not an entry", "1 entries", {{"bodies.1.velocity", "[1, 2]"}});
+  expect_error(base, "--set contact.law: \"stick\" is not a TOML value", "quotes", {{"contact.law", "stick"}});
+  expect_error(base, "--set contact.lw: unknown key", "'law'", {{"contact.lw", "\"stick\""}});
+  expect_error(base, "--set time.end.x: 'x' is inside a plain value", "tables", {{"time.end.x", "1"}});
+}
+
+TEST_F(CaseFile, EveryErrorNamesLineKeyAndRemedy) {
+  struct Wrong {
+    std::string old, with, start, remedy;
+  };
+  const Wrong wrongs[] = {
+      {"cells = [20, 10]", "cels = [20, 10]\ncells = [20, 10]", "case.toml:3: domain.cels: unknown key", "'cells'"},
+      {"end = 0.1", "end = \"x\"", "case.toml:5: time.end: is a string", "greater than 0"},
+      {"end = 0.1", "end = nan", "case.toml:5: time.end: nan", "greater than 0"},
+      {"end = 0.1", "end = inf", "case.toml:5: time.end: inf", "greater than 0"},
+      {"end = 0.1", "cfl = 0.1", "case.toml:4: time.end: is missing", "steps"},
+      {"end = 0.1", "steps = 1.5", "case.toml:5: time.steps: is a number", "integer"},
+      {"end = 0.1", "end = 0.1\nend = 0.2", "case.toml:6: not valid TOML", "end"},
+      {"[20, 10]", "[20]", "case.toml:3: domain.cells: has 1 entries", "2 numbers"},
+      {"cells = [20, 10]", "cell_size = 0.3", "case.toml:3: domain.cell_size: 0.3 does not divide", "0.333"},
+      {"density = 1000.0", "density = 0", "case.toml:8: materials.soft.density: 0 is out of range", "greater than 0"},
+      {"\"neo_hookean\"", "\"neo\"", "case.toml:7: materials.soft.model: \"neo\" is not a choice", "neo_hookean"},
+      {"bulk_modulus = 2.0e5", "poissons_ratio = 0.3", "case.toml:10: materials.soft.poissons_ratio: is given beside",
+       "one pair"},
+      {"shear_modulus = 1.0e5\nbulk_modulus = 2.0e5", "poissons_ratio = 0.3",
+       "case.toml:6: materials.soft.youngs_modulus: is missing", "greater than 0"},
+      {"radius = 0.2", "radius = [1]", "case.toml:12: bodies.0.shape.radius: is an array", "greater than 0"},
+      {"type = \"disk\", centre = [0.5, 0.5], radius = 0.2",
+       "type = \"polygon\", points = [[0, 0], [0.1, 0.1], [0.2, 0.2]]",
+       "case.toml:12: bodies.0.shape.points: enclose no area", "one line"},
+      {"type = \"disk\", centre = [0.5, 0.5], radius = 0.2", "type = \"polygon\", points = [[0, 0], [0.1, 0.1], [0.2]]",
+       "case.toml:12: bodies.0.shape.points: has 1 entries", "2 numbers"},
+      {"\"disk\"", "\"cube\"", "case.toml:12: bodies.0.shape.type: \"cube\" is not a choice", "box"},
+      {"radius = 0.2", "radius = 0.2, angle = 1", "case.toml:12: bodies.0.shape.angle: unknown key",
+       "known here: type, centre, radius"},
+      {"radius = 0.2", "radius = -1", "case.toml:12: bodies.0.shape.radius: -1 is out of range", "greater than 0"},
+      {"[0.5, 0.5]", "[1.5, 0.5]", "case.toml:12: bodies.0.shape: the body lies outside", "[0, 1]"},
+      {"material = \"soft\"", "material = \"sfot\"", "case.toml:13: bodies.0.material: \"sfot\" is not a material",
+       "soft"},
+      {"material = \"soft\"", "", "case.toml:11: bodies.0.material: is missing", "soft"},
+      {"[[bodies]]", "[bodies]", "case.toml:11: bodies: is one table", "[[bodies]]"},
+      {"[time]", "periodic = [true, 1]\n[time]", "case.toml:4: domain.periodic: must have 2 entries", "true or false"},
+      {"[time]", "[contact]\nlaw = \"none\"\n[[contact.pair]]\nmaterials = [\"wall\", \"wall\"]\n[time]",
+       "case.toml:7: contact.pair.0.materials: names two walls", "do not touch"},
+      {"[time]", "[contact]\nnormals = \"mass\"\n[time]", "case.toml:5: contact.normals: \"mass\" is not a choice",
+       "density, mass_gradient, volume_gradient"},
+      {"[time]", "[solver]\npoints_per_cell = 8\n[time]", "case.toml:5: solver.points_per_cell: 8 is not a square",
+       "4, 9"},
+  };
+  for (const auto& w : wrongs) expect_error(replaced(base, w.old, w.with), w.start, w.remedy);
+}
+
+TEST_F(CaseFile, AllErrorsComeAtOnceInOrder) {
+  const auto lines = errors(
+      replaced(replaced(replaced(base, "[20, 10]", "[0, 10]"), "end = 0.1", "end = -1"), "radius = 0.2", "radius = 0"),
+      {{"solver.flip", "2"}});
+  ASSERT_EQ(lines.size(), 4u);
+  EXPECT_TRUE(lines[0].starts_with("case.toml:3: domain.cells"));
+  EXPECT_TRUE(lines[1].starts_with("case.toml:5: time.end"));
+  EXPECT_TRUE(lines[2].starts_with("case.toml:12: bodies.0.shape.radius"));
+  EXPECT_TRUE(lines[3].starts_with("--set solver.flip")) << lines[3];
+}
+
+TEST_F(CaseFile, PeriodicDirections) {
+  const std::string periodic = replaced(base, "[time]", "periodic = [true, false]\n[time]");
+  EXPECT_EQ(read(replaced(periodic, "[0.5, 0.5]", "[0.05, 0.5]")).faces[1].type, FaceType::periodic);
+  expect_error(replaced(periodic, "[0.5, 0.5]", "[-0.05, 0.5]"), "case.toml:13: bodies.0.shape: the centre", "period");
+  expect_error(replaced(periodic, "radius = 0.2", "radius = 0.6"), "case.toml:13: bodies.0.shape: the body is",
+               "period");
+  expect_error(periodic + "[boundary]\nleft = { type = \"wall\" }\n",
+               "case.toml:16: boundary.left: direction x is periodic", "remove");
+  expect_error(replaced(periodic, "[20, 10]", "[3, 10]"), "case.toml:4: domain.periodic: direction x has 3 cells",
+               "at least 4");
+}
+
+TEST_F(CaseFile, GrainTableColumnsAndComments) {
+  write("pack.csv",
+        "# made by hand\r\n\r\n r , group, y,x,material\r\n0.05,a,0.2,0.1,hard\r\n# more\r\n+5e-2,,0.4,0.3,\r\n");
+  const std::string text = base +
+                           "[materials.hard]\nmodel = \"rigid\"\ndensity = 1\n[[grains]]\nfile = "
+                           "\"pack.csv\"\nmaterial = \"soft\"\ngroup = \"b\"\n";
+  const Case c = read(text);
+  ASSERT_EQ(c.bodies.size(), 3u);
+  EXPECT_EQ(std::get<Ball>(c.bodies[1].shape).centre, Vec3(0.1, 0.2, 0));
+  EXPECT_EQ(c.bodies[1].material, 1);
+  EXPECT_EQ(c.bodies[1].group, "a");
+  EXPECT_EQ(std::get<Ball>(c.bodies[2].shape).radius, 0.05);
+  EXPECT_EQ(c.bodies[2].material, 0);
+  EXPECT_EQ(c.bodies[2].group, "b");
+  EXPECT_EQ(c.bodies[2].source, (folder_ / "pack.csv").string() + ":6");
+}
+
+TEST_F(CaseFile, GrainTableErrors) {
+  const std::string text = base + "[[grains]]\nfile = \"pack.csv\"\n";
+  const std::pair<std::string, std::string> wrongs[] = {
+      {"x,y,r\n0.5,0.5,0.1\n", "pack.csv:2: material: is missing"},
+      {"x,y,z,r,material\n0.5,0.5,0,0.1,soft\n", "pack.csv:1: z: this column belongs to 3D"},
+      {"x,y,r,y\n", "pack.csv:1: y: this column is named twice"},
+      {"x,y,rad\n", "pack.csv:1: \"rad\" is not a column"},
+      {"x,y,r,material\n0.5,0.5,1e999,soft\n", "pack.csv:2: r: 1e999 is out of range"},
+      {"x,y,r,material\n0.5,0.5,0.1\n", "pack.csv:2: has 3 values"},
+      {"\n# nothing\n", "pack.csv:2: there is no header line"},
+  };
+  for (const auto& [csv, start] : wrongs) {
+    write("pack.csv", csv);
+    expect_error(text, start, "");
+  }
+  std::string many = "x,y,r,material\n";
+  for (int i = 0; i < 30; ++i) many += "0.5,0.5,-1,soft\n";
+  write("pack.csv", many);
+  const auto lines = errors(text);
+  ASSERT_EQ(lines.size(), 21u);
+  EXPECT_TRUE(lines[19].starts_with("pack.csv:21: r: "));
+  EXPECT_EQ(lines[20], "pack.csv: ... and 10 more");
+}
+
+TEST_F(CaseFile, GrainTableOfManyRowsIsFast) {
+  std::string csv = "x,y,r\n";
+  for (int i = 0; i < 65536; ++i) csv += fmt::format("{},{},0.001\n", (i % 256 + 0.5) / 256, (i / 256 + 0.5) / 256);
+  write("pack.csv", csv);
+  const std::string text =
+      base.substr(0, base.find("[[bodies]]")) + "[[grains]]\nfile = \"pack.csv\"\nmaterial = \"soft\"\n";
+  const auto start = std::chrono::steady_clock::now();
+  const Case c = read(text);
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  EXPECT_EQ(c.bodies.size(), 65536u);
+  EXPECT_LT(elapsed.count(), 5.0);  // a tenth of a second in a release build
+}
+
+/// Overlapping pairs by comparing all with all and their periodic images.
+std::int64_t count_overlaps(const Case& c) {
+  std::int64_t count = 0;
+  for (std::size_t i = 0; i < c.bodies.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const auto& a = std::get<Ball>(c.bodies[i].shape);
+      const auto& b = std::get<Ball>(c.bodies[j].shape);
+      for (int image = -1; image <= 1; ++image) {
+        const double reach = a.radius + b.radius - 0.01 * std::min(a.radius, b.radius);
+        count += (a.centre - b.centre + Vec3(image, 0, 0)).norm() < reach;
+      }
+    }
+  return count;
+}
+
+TEST_F(CaseFile, OverlapWarningCountsEveryPairOnce) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::string csv = "x,y,r\n0.02,0.5,0.2\n";  // one large among many small: sizes over three decades
+  for (int i = 0; i < 1500; ++i)
+    csv += fmt::format("{},{},{}\n", unit(random), unit(random), 0.03 * std::pow(10, -3 * unit(random)));
+  write("pack.csv", csv);
+  const std::string text =
+      replaced(base.substr(0, base.find("[[bodies]]")), "[time]", "periodic = [true, false]\n[time]") +
+      "[[grains]]\nfile = \"pack.csv\"\nmaterial = \"soft\"\n";
+  const Case c = read(text);
+  const std::int64_t expected = count_overlaps(c);
+  ASSERT_GT(expected, 100);
+  ASSERT_EQ(c.warnings.size(), 2u);  // the small ones are thin, too
+  EXPECT_NE(c.warnings[1].find(fmt::format("; {} pairs", expected)), std::string::npos) << c.warnings[1] << expected;
+}
+
+TEST_F(CaseFile, ThinBodiesAreWarnedOfOnce) {
+  const Case c = read(replaced(base, "radius = 0.2", "radius = 0.04"));
+  ASSERT_EQ(c.warnings.size(), 1u);
+  EXPECT_NE(c.warnings[0].find("case.toml:11: body 0 is 1.6 cells wide; 1 of 1 bodies"), std::string::npos)
+      << c.warnings[0];
+}
+
+TEST_F(CaseFile, UnreadableFilesAreRefused) {
+  EXPECT_THROW(read_case(folder_ / "nothing.toml"), InputError);
+  EXPECT_THROW(read_case(folder_), InputError);
+  EXPECT_THROW(read(""), InputError);
+  EXPECT_THROW(read(std::string("\0\1\2", 3)), InputError);
+  EXPECT_THROW(read("\xff\xfe[domain]"), InputError);
+  EXPECT_THROW(read(std::string(5000, '[')), InputError);
+}
+
+TEST_F(CaseFile, PackSpec) {
+  const std::string spec =
+      "[pack]\nupper = [1.0, 2.0]\nperiodic = [false, true]\nwalls = \"overlap\"\ncount = 9\nseed = 5\n"
+      "[sizes]\ntype = \"list\"\ndiameters = [0.1, 0.2]\nweights = [2, 1]\n";
+  const PackSpec read = read_pack_spec(write("spec.toml", spec));
+  EXPECT_EQ(read.upper, Vec3(1, 2, 0));
+  EXPECT_EQ(read.periodic, (std::array{false, true, false}));
+  EXPECT_EQ(read.walls, PackWalls::overlap);
+  EXPECT_EQ(read.count, 9);
+  EXPECT_EQ(read.seed, 5u);
+  EXPECT_EQ(read.sizes.type, SizeType::list);
+  EXPECT_EQ(read.sizes.diameters, (std::vector{0.1, 0.2}));
+  EXPECT_EQ(read.sizes.weights, (std::vector{2.0, 1.0}));
+  try {
+    read_pack_spec(
+        write("spec.toml", replaced(replaced(spec, "seed", "sed"), "type = \"list\"", "type = \"list\"\nmin = 1.0")));
+    FAIL();
+  } catch (const InputError& error) {
+    ASSERT_EQ(error.messages().size(), 2u) << error.what();
+    EXPECT_NE(error.messages()[0].find("spec.toml:6: pack.sed: unknown key; the nearest known key is 'seed'"),
+              std::string::npos);
+    EXPECT_NE(error.messages()[1].find("spec.toml:9: sizes.min: does not belong to type \"list\""), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace cairn
