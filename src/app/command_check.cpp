@@ -47,7 +47,7 @@ Estimate estimate(const Case& c) {
   constexpr double state_columns = 3, node_columns[] = {12, 16};
   const double point_bytes = 16 + 8 * (state_columns + (dim == 2 ? PointColumns<2>::state : PointColumns<3>::state));
   const Vec3 h = (d.upper - d.lower).cwiseQuotient(Vec3(d.cells[0], d.cells[1], d.cells[2]));
-  const double cell = h.head(dim).prod();
+  const double cell = h[0] * h[1] * (dim == 3 ? h[2] : 1.0);
   Estimate result;
   for (const auto& body : c.bodies) {
     const Bounds b = bounds(body.shape);

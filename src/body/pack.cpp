@@ -1,13 +1,13 @@
 #include "cairn/body/pack.hpp"
 
-#include "cairn/core/error.hpp"
-#include "pack_detail.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 #include <numeric>
+
+#include "cairn/core/error.hpp"
+#include "pack_detail.hpp"
 
 namespace cairn {
 namespace {
@@ -61,7 +61,8 @@ void check_sizes(const PackSpec& spec, std::vector<std::string>& errors) {
     errors.push_back("sizes.scale = true: needs both pack.count and pack.fraction");
   }
   switch (s.type) {
-    case SizeType::uniform: return check_range(s, false, errors);
+    case SizeType::uniform:
+      return check_range(s, false, errors);
     case SizeType::lognormal:
       if (s.min > 0 && s.max > 0) check_range(s, true, errors);
       if (!(s.sigma > 0 && s.sigma < 3)) {
@@ -70,16 +71,24 @@ void check_sizes(const PackSpec& spec, std::vector<std::string>& errors) {
       return check_mean(s, errors);
     case SizeType::fit:
       check_range(s, true, errors);
-      if (s.scale) errors.push_back("sizes.scale = true: not with type \"fit\", whose diameters are fixed by min and max");
+      if (s.scale)
+        errors.push_back("sizes.scale = true: not with type \"fit\", whose diameters are fixed by min and max");
       return check_mean(s, errors);
     case SizeType::list:
       if (s.diameters.empty()) errors.push_back("sizes.diameters: at least one is needed");
       if (!s.weights.empty() && s.weights.size() != s.diameters.size()) {
-        errors.push_back(fmt::format("sizes.weights: {} values for {} diameters", s.weights.size(), s.diameters.size()));
+        errors.push_back(
+            fmt::format("sizes.weights: {} values for {} diameters", s.weights.size(), s.diameters.size()));
       }
       const auto bad = [](double v) { return !(v > 0 && std::isfinite(v)); };
-      if (std::any_of(s.diameters.begin(), s.diameters.end(), bad)) errors.push_back("sizes.diameters: must be above 0");
-      if (std::any_of(s.weights.begin(), s.weights.end(), bad)) errors.push_back("sizes.weights: must be above 0");
+      if (std::any_of(s.diameters.begin(), s.diameters.end(), bad)) {
+        errors.push_back("sizes.diameters: must all be above 0");
+      }
+      const auto negative = [](double v) { return !(v >= 0 && std::isfinite(v)); };
+      if (std::any_of(s.weights.begin(), s.weights.end(), negative) ||
+          (!s.weights.empty() && std::none_of(s.weights.begin(), s.weights.end(), [](double v) { return v > 0; }))) {
+        errors.push_back("sizes.weights: must not be below 0, and one at least above 0");
+      }
   }
 }
 
@@ -87,16 +96,16 @@ void check_room(const PackSpec& spec, const std::vector<double>& diameters, std:
   for (int k = 0; k < spec.dimension; ++k) {
     const double length = spec.upper[k] - spec.lower[k], least = (spec.periodic[k] ? 2 : 1) * diameters.front();
     if (length > least) continue;
-    errors.push_back(fmt::format("pack.lower, pack.upper: the box is {:.4g} long along {}, but the largest grain ({:.4g}) "
-                                 "needs more than {:.4g}{}",
-                                 length, "xyz"[k], diameters.front(), least,
-                                 spec.periodic[k] ? " in a periodic direction" : ""));
+    errors.push_back(
+        fmt::format("pack.lower, pack.upper: the box is {:.4g} long along {}, but the largest grain ({:.4g}) "
+                    "needs more than {:.4g}{}",
+                    length, "xyz"[k], diameters.front(), least, spec.periodic[k] ? " in a periodic direction" : ""));
   }
   double solid = 0;
   for (double d : diameters) solid += grain_volume(spec.dimension, d);
   if (solid >= box_volume(spec)) {
-    errors.push_back(fmt::format("pack.count, [sizes]: the grains fill {:.4g}, the box has only {:.4g}", solid,
-                                 box_volume(spec)));
+    errors.push_back(
+        fmt::format("pack.count, [sizes]: the grains fill {:.4g}, the box has only {:.4g}", solid, box_volume(spec)));
   }
 }
 

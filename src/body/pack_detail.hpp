@@ -1,11 +1,11 @@
 #pragma once
 /// Parts of the packing method that only its own sources see.
 
-#include "cairn/body/pack.hpp"
-
 #include <cmath>
 #include <optional>
 #include <random>
+
+#include "cairn/body/pack.hpp"
 
 namespace cairn::pack_detail {
 
@@ -30,8 +30,7 @@ double expected_loss(const PackSpec& spec, const std::vector<double>& diameters)
 
 /// The diameters [m], largest first. `solid` is the total area or volume of the grains wanted, for sizes which adapt
 /// (fit and scale); empty: from the spec. What is wrong is added to `errors`; the result is then of no use.
-std::vector<double> draw_diameters(const PackSpec& spec, std::optional<double> solid,
-                                   std::vector<std::string>& errors);
+std::vector<double> draw_diameters(const PackSpec& spec, std::optional<double> solid, std::vector<std::string>& errors);
 
 /// True where sizes adapt to the fraction.
 bool sizes_adapt(const PackSpec& spec);
@@ -82,7 +81,8 @@ class LevelGrid {
   void insert(int grain, double radius, const std::array<double, Dim>& x);
   void remove(int grain, double radius, const std::array<double, Dim>& x);
 
-  /// Calls `f(j)` for the grains of level `finest` and coarser that may be nearer to `x` than `reach` plus their radius.
+  /// Calls `f(j)` for the grains of level `finest` and coarser that may be nearer to `x` than `reach` plus their
+  /// radius.
   template <class F>
   void visit(const std::array<double, Dim>& x, double reach, int finest, const F& f) const {
     for (int l = 0; l <= finest; ++l) {
@@ -110,8 +110,7 @@ class LevelGrid {
 
 template <int Dim>
 template <class F>
-void LevelGrid<Dim>::visit_level(const Level& level, const std::array<double, Dim>& x, double reach,
-                                 const F& f) const {
+void LevelGrid<Dim>::visit_level(const Level& level, const std::array<double, Dim>& x, double reach, const F& f) const {
   std::array<int, 3> first{}, last{}, cells{1, 1, 1};
   for (int k = 0; k < Dim; ++k) {
     const double at = x[k] - box_.lower[k], far = reach + level.largest;

@@ -1,9 +1,9 @@
 // Cells in levels of size, and the check of overlaps that uses nothing else.
 
-#include "pack_detail.hpp"
-
 #include <algorithm>
 #include <numeric>
+
+#include "pack_detail.hpp"
 
 namespace cairn::pack_detail {
 

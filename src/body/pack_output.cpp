@@ -1,8 +1,5 @@
 // What a pack delivers: the parts of its grains inside the box, and the grain table.
 
-#include "cairn/core/error.hpp"
-#include "pack_detail.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +7,9 @@
 #include <fstream>
 #include <limits>
 #include <numbers>
+
+#include "cairn/core/error.hpp"
+#include "pack_detail.hpp"
 
 namespace cairn {
 namespace {

@@ -1,10 +1,10 @@
 // The search for a pack without overlaps: placing, growing, and moving the grains which do not fit.
 
-#include "pack_minimiser.hpp"
-
 #include <algorithm>
 #include <numeric>
 #include <type_traits>
+
+#include "pack_minimiser.hpp"
 
 namespace cairn::pack_detail {
 namespace {
@@ -25,8 +25,8 @@ LevelGrid<Dim> grid_of(const Grains<Dim>& grains) {
 
 /// Distance from `at` to the nearest surface of a grain, at most `most`; below zero inside a grain.
 template <int Dim>
-double clearance(const Grains<Dim>& grains, const LevelGrid<Dim>& grid, const std::type_identity_t<std::array<double, Dim>>& at, double scale,
-                 double most) {
+double clearance(const Grains<Dim>& grains, const LevelGrid<Dim>& grid,
+                 const std::type_identity_t<std::array<double, Dim>>& at, double scale, double most) {
   double least = most;
   grid.visit(at, most, grid.finest(), [&](int j) {
     double d2 = 0;

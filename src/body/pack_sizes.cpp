@@ -1,13 +1,13 @@
 // Diameters of a packing: quantiles of the distribution asked for, so that its moments do not depend on chance.
 
-#include "pack_detail.hpp"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <functional>
 #include <numbers>
 #include <numeric>
+
+#include "pack_detail.hpp"
 
 namespace cairn::pack_detail {
 namespace {
@@ -101,8 +101,7 @@ std::vector<double> draw_power_law(const SizeSpec& s, int n) {
 std::optional<Table> tilt(const SizeSpec& s, int dim, const Eigen::Vector2d& means, Eigen::Vector2d& lambda) {
   const auto powers = [&](double d) { return Eigen::Vector2d(d / s.mean, std::pow(d / s.mean, dim)); };
   const auto make = [&](const Eigen::Vector2d& l) {
-    return tabulate(s.min, s.max,
-                    [&](double d) { return l.dot(powers(d)) - (dim + 1) * std::log(d / s.mean); });
+    return tabulate(s.min, s.max, [&](double d) { return l.dot(powers(d)) - (dim + 1) * std::log(d / s.mean); });
   };
   const auto moments = [&](const Table& t, Eigen::Matrix2d& covariance) {
     Eigen::Vector2d first = Eigen::Vector2d::Zero();
@@ -207,8 +206,8 @@ std::string fit_error(const PackSpec& spec, double solid) {
   const SizeSpec& s = spec.sizes;
   const int dim = spec.dimension;
   const double unit = grain_volume(dim, 1.0), low = std::pow(s.mean, dim);
-  const double high = std::pow(s.min, dim) + (s.mean - s.min) * (std::pow(s.max, dim) - std::pow(s.min, dim)) /
-                                                 (s.max - s.min);
+  const double high =
+      std::pow(s.min, dim) + (s.mean - s.min) * (std::pow(s.max, dim) - std::pow(s.min, dim)) / (s.max - s.min);
   const double box = box_volume(spec);
   return fmt::format(
       "pack.count, pack.fraction and [sizes] contradict each other: {} grains at fraction {:.4g} need a mean {} of "
@@ -241,7 +240,8 @@ void check_sum(const PackSpec& spec, const std::vector<double>& d, std::vector<s
   const double margin = 0.005 * spec.fraction * box + 0.5 * inside / static_cast<double>(d.size());
   if (std::abs(inside - spec.fraction * box) <= margin) return;
   errors.push_back(fmt::format(
-      "pack.count, pack.fraction and [sizes] contradict each other: {} grains of these sizes fill {:.4g} {}, a fraction "
+      "pack.count, pack.fraction and [sizes] contradict each other: {} grains of these sizes fill {:.4g} {}, a "
+      "fraction "
       "of {:.4g} of the box, not {:.4g}; leave out count (it would be {}) or fraction, or set sizes.scale = true",
       spec.count, inside, spec.dimension == 2 ? "m^2" : "m^3", inside / box, spec.fraction, derive_count(spec)));
 }
@@ -285,8 +285,7 @@ std::vector<double> draw_diameters(const PackSpec& given, std::optional<double> 
   std::optional<std::vector<double>> d;
   if (spec.sizes.type == SizeType::fit && spec.fraction > 0) {
     const auto draw = [&](double total) {
-      return draw_fit(spec.sizes, spec.dimension, spec.count,
-                      total / (spec.count * grain_volume(spec.dimension, 1.0)));
+      return draw_fit(spec.sizes, spec.dimension, spec.count, total / (spec.count * grain_volume(spec.dimension, 1.0)));
     };
     d = solid ? draw(*solid) : draw_for_inside(spec, inside, draw);
     if (!d) errors.push_back(fit_error(spec, solid.value_or(inside)));

@@ -71,13 +71,11 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const Lattice<Dim>
                                      const ContactSettings<Dim>& settings, const std::vector<Body>& bodies) {
   shared_.clear();
   int total = 0;
-  std::vector<Index<Dim>> places;
   int at = 0;
   for_each(box_, [&](const Index<Dim>& i) {
     std::int32_t& slot = bodies_at_[at++];
     if (slot < 2) return void(slot = -1);
-    shared_.push_back({total, slot, 0, lattice.owns_node(patch.id, i) ? 1.0 : 0.0});
-    places.push_back(i);
+    shared_.push_back({total, slot, 0, i, lattice.owns_node(patch.id, i) ? 1.0 : 0.0});
     total += slot;
     slot = static_cast<std::int32_t>(shared_.size()) - 1;
   });
@@ -97,13 +95,13 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const Lattice<Dim>
       }
     });
   }
-  for (std::size_t s = 0; s < shared_.size(); ++s) prepare(shared_[s], places[s], patch, lattice, settings, bodies);
+  for (auto& node : shared_) prepare(node, patch, lattice, settings, bodies);
 }
 
 template <int Dim>
-void ContactSweep<Dim>::prepare(SharedNode& node, const Index<Dim>& place, const Patch<Dim>& patch,
-                                const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                                const std::vector<Body>& bodies) {
+void ContactSweep<Dim>::prepare(SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                const ContactSettings<Dim>& settings, const std::vector<Body>& bodies) {
+  const Index<Dim>& place = node.place;
   ContactEntry<Dim>* entry = &entries_[node.first];
   double room = lattice.cell_volume();
   bool fixed = false;
@@ -292,6 +290,7 @@ void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& latti
           impulses_[i] / dt;
     }
     if (node.share > 0) keep_ledger(node, patch, dt);
+    if (node.share > 0 && settings.keep_contacts) keep_pairs(node, patch, lattice);
   }
 }
 
@@ -313,6 +312,25 @@ void ContactSweep<Dim>::keep_ledger(const SharedNode& node, Patch<Dim>& patch, d
     patch.ledger.boundary_work += node.share * driven;
   }
   patch.ledger.contact_nodes += touched;
+}
+
+template <int Dim>
+void ContactSweep<Dim>::keep_pairs(const SharedNode& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const {
+  const auto& partner = entries_[node.first + node.partner];
+  for (int i = 0; i < node.count; ++i) {
+    const auto& entry = entries_[node.first + i];
+    const double size = node.share * impulses_[i].norm();
+    if (i == node.partner || !(size > 0)) continue;
+    const int body = patch.pieces[entry.piece].body, other = patch.pieces[partner.piece].body;
+    const double sign = body < other ? 1.0 : -1.0;  // impulse on the lower body, normal towards the higher
+    double* sum = patch.contacts[std::minmax(body, other)].values.data();
+    sum[0] += size;
+    for (int d = 0; d < Dim; ++d) {
+      sum[1 + d] += sign * node.share * impulses_[i][d];
+      sum[1 + Dim + d] += size * lattice.node_position(d, node.place[d]);
+      sum[1 + 2 * Dim + d] += sign * size * entry.normal[d];
+    }
+  }
 }
 
 template <int Dim>

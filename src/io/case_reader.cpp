@@ -257,7 +257,8 @@ Vec3 Table::scalar_or_vector(std::string_view key, int size, const Range& range)
   const toml::node* node = find(key);
   if (!node || node->is_array()) return vector(key, size, std::nullopt, range);
   Vec3 result = Vec3::Zero();
-  result.head(size).setConstant(as_number(*node, key, range).value_or(1.0));
+  const double value = as_number(*node, key, range).value_or(1.0);
+  for (int i = 0; i < size; ++i) result[i] = value;
   return result;
 }
 

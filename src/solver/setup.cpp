@@ -202,6 +202,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
   std::array<FaceType, 6> types{};
   for (int f = 0; f < 2 * Dim; ++f) types[f] = faces_[f].type;
   contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, types);
+  contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   bodies_ = make_bodies(c, materials_);
 
   // Each rank counts the points of some patches; then every rank knows all counts and deals the patches out alike.

@@ -153,7 +153,8 @@ yield_stress = 0.3e9
 model = "rigid"
 density = 1.0
 [[bodies]]
-shape = { type = "difference", of = [ { type = "box", lower = [0.3, 0.2], upper = [0.7, 0.8], angle = 0.1 }, { type = "ellipse", centre = [0.5, 0.5], radii = [0.1, 0.2] } ] }
+shape = { type = "difference", of = [ { type = "box", lower = [0.3, 0.2], upper = [0.7, 0.8], angle = 0.1 },
+                                      { type = "ellipse", centre = [0.5, 0.5], radii = [0.1, 0.2] } ] }
 material = "z"
 velocity = [0.1, -0.2]
 angular_velocity = 0.3
@@ -231,11 +232,14 @@ density = 1
 shear_modulus = 1
 bulk_modulus = 1
 [[bodies]]
-shape = { type = "intersection", of = [ { type = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.3 }, { type = "half_space", point = [0.5, 0.5, 0.5], normal = [0, 0, 1] } ] }
+shape = { type = "intersection", of = [ { type = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.3 },
+                                        { type = "half_space", point = [0.5, 0.5, 0.5], normal = [0, 0, 1] } ] }
 material = "m"
 angular_velocity = [1.0, 2.0, 3.0]
 [[bodies]]
-shape = { type = "union", of = [ { type = "cylinder", from = [0.5, 0.5, 1.0], to = [0.5, 0.5, 1.5], radius = 0.2 }, { type = "ellipsoid", centre = [0.5, 0.5, 1.5], radii = [0.2, 0.2, 0.1] }, { type = "box", lower = [0.1, 0.1, 1], upper = [0.3, 0.3, 1.2] } ] }
+shape = { type = "union", of = [ { type = "cylinder", from = [0.5, 0.5, 1.0], to = [0.5, 0.5, 1.5], radius = 0.2 },
+                                 { type = "ellipsoid", centre = [0.5, 0.5, 1.5], radii = [0.2, 0.2, 0.1] },
+                                 { type = "box", lower = [0.1, 0.1, 1], upper = [0.3, 0.3, 1.2] } ] }
 material = "m"
 [[drive]]
 ids = [1]

@@ -5,6 +5,8 @@
 #include "cairn/grid/lattice.hpp"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 namespace cairn {
 
@@ -13,6 +15,14 @@ struct PatchLedger {
   double contact_dissipation = 0;  // [J]
   double boundary_work = 0;        // done by faces, walls and rigid bodies on deformable ones [J]
   std::int64_t contact_nodes = 0;  // nodes with a contact impulse in the last step
+};
+
+/// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared.
+template <int Dim>
+struct ContactSum {
+  static constexpr int size = 1 + 3 * Dim;
+  /// Sum of |impulse| [N s], impulse on a, |impulse| x position, |impulse| x normal (from a to b).
+  std::array<double, size> values{};
 };
 
 template <int Dim>
@@ -25,6 +35,7 @@ struct Patch {
   int links_before = 0;            // links whose contributions come before the patch's own
   std::vector<Piece<Dim>> pieces;  // ascending in body; those without points are ghosts
   PatchLedger ledger;
+  std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
 
   Patch(int id_, const Lattice<Dim>& lattice) : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
     links = lattice.links(id);

@@ -29,6 +29,7 @@ struct ContactSettings {
   std::vector<ContactMaterial> materials;
   std::vector<PairLaw> pairs;  // materials x materials, then one row for walls
   std::array<FaceType, 6> faces{};
+  bool keep_contacts = false;  // sum what passes between pairs, for output
 
   static ContactSettings make(const ContactOptions& options, std::vector<ContactMaterial> materials,
                               const std::array<FaceType, 6>& faces);
@@ -69,6 +70,7 @@ class ContactSweep {
  private:
   struct SharedNode {
     int first, count, partner;  // entries; position of the partner among them
+    Index<Dim> place;
     double share;               // in the ledger: 0 where another patch answers for it, half on a symmetry plane
   };
   enum class Pass { first, second, repeat };
@@ -76,7 +78,7 @@ class ContactSweep {
   void count_bodies(const Patch<Dim>& patch);
   void list_entries(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
                     const std::vector<Body>& bodies);
-  void prepare(SharedNode& node, const Index<Dim>& place, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+  void prepare(SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
   void set_normals(const SharedNode& node, const Patch<Dim>& patch, NormalChoice choice);
   void set_gates(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
@@ -86,6 +88,7 @@ class ContactSweep {
   /// Impulses on all bodies of a node, from the momenta and forces in momenta_ and forces_; result in impulses_.
   void resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt, Pass pass);
   void load_node(const SharedNode& node, const Patch<Dim>& patch, Pass pass, double dt);
+  void keep_pairs(const SharedNode& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
   void keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt) const;
 
   Box<Dim> box_;

@@ -58,6 +58,11 @@ class Simulation {
   const StageTimers& timers() const { return timers_; }
   const Traffic& traffic() const { return messages_->traffic(); }
 
+  /// Forgets the contacts summed so far. They are kept only where the case writes grains or contacts.
+  void clear_contacts() {
+    for (auto& patch : patches_) patch.contacts.clear();
+  }
+
   /// Energies, momentum and ledger. Collective; the result is valid on rank 0.
   Totals totals() const;
 

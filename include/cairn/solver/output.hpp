@@ -1,0 +1,22 @@
+#pragma once
+/// Result files of a run, as columns of the simulation's state. Names and layout: docs/results.md.
+
+#include "cairn/solver/simulation.hpp"
+
+#include <filesystem>
+
+namespace cairn {
+
+/// Writes the material points with the fields asked for. Collective.
+template <int Dim>
+void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file, const std::vector<std::string>& fields);
+
+/// Writes one row for each body. Collective.
+template <int Dim>
+void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path& file);
+
+/// Writes one row for each touching pair, forces averaged over `duration` [s]. Collective.
+template <int Dim>
+void write_contacts(const Simulation<Dim>& simulation, const std::filesystem::path& file, double duration);
+
+}  // namespace cairn
