@@ -85,9 +85,9 @@ void print_summary(const Case& c) {
 
 }  // namespace
 
-int command_check(const std::filesystem::path& file) {
+int command_check(const std::filesystem::path& file, const std::vector<Override>& overrides) {
   return on_first_rank([&] {
-    const Case c = read_case(file);
+    const Case c = read_case(file, overrides);
     print_summary(c);
     print_warnings(c.warnings);
   });

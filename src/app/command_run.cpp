@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "cairn/core/error.hpp"
+#include "cairn/io/result_files.hpp"
 #include "cairn/solver/run.hpp"
 #include "commands.hpp"
 #include "report.hpp"
@@ -26,6 +27,16 @@ std::vector<fs::path> make_folder(const fs::path& out) {
   return made;
 }
 
+/// Refuses a folder that holds the results of another run.
+void check_free(const fs::path& out) {
+  const auto results = find_results(out);
+  if (results.empty()) return;
+  throw InputError(fmt::format("--out: {}: holds results already ({}{}); choose another folder, or add --overwrite to "
+                               "remove them",
+                               out.string(), results[0].filename().string(),
+                               results.size() > 1 ? fmt::format(" and {} more files", results.size() - 1) : ""));
+}
+
 }  // namespace
 
 int command_run(const RunArguments& arguments) {
@@ -33,10 +44,16 @@ int command_run(const RunArguments& arguments) {
   if (const int code = settle(attempt([&] { c = read_case(arguments.file, arguments.overrides); }))) return code;
   print_warnings(c.warnings);
 
-  RunSettings settings{arguments.out, arguments.restart, arguments.profile};
+  RunSettings settings{arguments.out, arguments.restart, arguments.profile, arguments.overwrite};
   if (settings.out.empty()) settings.out = arguments.file.stem();
   std::vector<fs::path> made;
-  if (const int code = on_first_rank([&] { made = make_folder(settings.out); })) return code;
+  const auto prepare = [&] {
+    if (settings.overwrite && !settings.restart.empty())
+      throw InputError("--overwrite: would remove what --restart goes on from; give one of the two");
+    if (!settings.overwrite && settings.restart.empty()) check_free(settings.out);
+    made = make_folder(settings.out);
+  };
+  if (const int code = on_first_rank(prepare)) return code;
 
   int code = done;
   if (const int error = settle(attempt([&] { code = run_case(c, settings, MPI_COMM_WORLD); }))) code = error;

@@ -16,7 +16,7 @@ struct RunArguments {
   std::filesystem::path file, out;
   std::vector<Override> overrides;
   std::string restart;
-  bool profile = false;
+  bool profile = false, overwrite = false;
 };
 
 struct PackArguments {
@@ -24,7 +24,7 @@ struct PackArguments {
 };
 
 int command_run(const RunArguments& arguments);
-int command_check(const std::filesystem::path& file);
+int command_check(const std::filesystem::path& file, const std::vector<Override>& overrides);
 int command_info(const std::filesystem::path& file);
 int command_pack(const PackArguments& arguments);
 

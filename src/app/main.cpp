@@ -3,6 +3,7 @@
 #include <mpi.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <iostream>
 #include <sstream>
 
@@ -27,6 +28,12 @@ Override parse_override(const std::string& text) {
   return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
+/// Adds --set; parse_override serves its values.
+void add_sets(CLI::App* command, Arguments& a) {
+  command->add_option("--set", a.sets, "KEY=VALUE: override a key by its dotted path; VALUE is TOML; may be repeated")
+      ->allow_extra_args(false);
+}
+
 /// Defines the commands; `command` will hold the one to call.
 void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
   app.require_subcommand(1);
@@ -35,10 +42,10 @@ void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
   CLI::App* run = app.add_subcommand("run", "Run a case");
   run->add_option("CASE.toml", a.file, "the case file")->required();
   run->add_option("--out", a.run.out, "folder of the results; default: the case file's name");
-  run->add_option("--set", a.sets, "KEY=VALUE: override a key by its dotted path; VALUE is TOML; may be repeated")
-      ->allow_extra_args(false);
+  add_sets(run, a);
   run->add_option("--restart", a.run.restart,
                   "go on from a checkpoint FILE, or from the 'latest' in the folder of the results");
+  run->add_flag("--overwrite", a.run.overwrite, "remove the results that the folder already holds");
   run->add_flag("--profile", a.run.profile, "report where the time went");
   run->callback([&] {
     for (const auto& text : a.sets) a.run.overrides.push_back(parse_override(text));
@@ -48,7 +55,11 @@ void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
 
   CLI::App* check = app.add_subcommand("check", "Report every error of a case file; creates nothing");
   check->add_option("CASE.toml", a.file, "the case file")->required();
-  check->callback([&] { command = [&a] { return command_check(a.file); }; });
+  add_sets(check, a);
+  check->callback([&] {
+    for (const auto& text : a.sets) a.run.overrides.push_back(parse_override(text));
+    command = [&a] { return command_check(a.file, a.run.overrides); };
+  });
 
   CLI::App* info = app.add_subcommand("info", "Say what a result or checkpoint holds");
   info->add_option("FILE.h5", a.file, "the file")->required();
@@ -83,6 +94,9 @@ int dispatch(int argc, char** argv) {
 }  // namespace cairn::app
 
 int main(int argc, char** argv) {
+  // A file at its size limit and a reader that went away are errors of the call that writes, not the program's end.
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::signal(SIGPIPE, SIG_IGN);
   MPI_Init(&argc, &argv);
   int code = cairn::app::done;
   const auto failure = cairn::app::attempt([&] { code = cairn::app::dispatch(argc, argv); });

@@ -132,6 +132,7 @@ class Packing {
   void set_sizes();
   bool refit(double fraction);
   double fraction_inside() const;
+  [[noreturn]] void fail(const Overlap& left) const;
   Pack deliver() const;
 
   const PackSpec& spec_;
@@ -190,6 +191,19 @@ bool Packing<Dim>::refit(double fraction) {
 }
 
 template <int Dim>
+void Packing<Dim>::fail(const Overlap& left) const {
+  // Grains smaller by about the overlaps that are left would have fitted; jammed grains have Dim contacts each.
+  const double typical = std::min(0.3, std::sqrt(left.energy / (Dim * static_cast<double>(diameters_.size()))));
+  const double lower = std::floor(100 * (pack_.fraction * std::pow(1 - typical, Dim) - 0.005)) / 100;
+  throw RunError(fmt::format(
+      "pack: not reached: {} grains at fraction {:.4f} still overlap by {:.2g} of the smaller radius, {:.2g} is "
+      "allowed, "
+      "after {} iterations; ask for a lower fraction (try {:.2f}), a wider range of sizes, another seed, or a larger "
+      "pack.max_overlap",
+      diameters_.size(), pack_.fraction, left.largest, spec_.max_overlap, pack_.iterations, lower));
+}
+
+template <int Dim>
 Pack Packing<Dim>::make() {
   const double n = static_cast<double>(diameters_.size());
   double budget = std::max(3e8, 4e4 * n);  // grains times iterations: seconds for a few hundred, minutes for 1e5
@@ -198,16 +212,10 @@ Pack Packing<Dim>::make() {
   constexpr int most_refits = 6;
   for (int i = 0;; ++i) {
     const bool clear = settle(grains_, random_, spec_.max_overlap, pack_.iterations, budget);
+    const Overlap left = measure_overlap(grains_);
     pack_.fraction = fraction_inside();
-    pack_.max_overlap = measure_overlap(grains_).largest;
-    if (!clear || pack_.max_overlap > spec_.max_overlap) {
-      throw RunError(fmt::format(
-          "pack: not reached: {} grains at fraction {:.4f} still overlap by {:.2g} of the smaller radius, {:.2g} is "
-          "allowed, after {} iterations; ask for a lower fraction (try {:.3f}), a wider range of sizes, another seed, "
-          "or a larger pack.max_overlap",
-          diameters_.size(), pack_.fraction, pack_.max_overlap, spec_.max_overlap, pack_.iterations,
-          pack_.fraction - 0.01));
-    }
+    pack_.max_overlap = left.largest;
+    if (!clear || left.largest > spec_.max_overlap) fail(left);
     if (i == most_refits || !refit(pack_.fraction)) return deliver();
   }
 }

@@ -306,7 +306,9 @@ void ContactSweep<Dim>::keep_ledger(const SharedNode& node, Patch<Dim>& patch, d
     // The nodes' mean velocity over the step, from after the first pass on: strains see the same velocities, so that the
     // energy given to the points and that taken from their strain are of one book.
     const Vec<Dim> doubled_mean = 2 * momenta_[i] - dt * forces_[i] + impulse;
-    const double given = 0.5 * impulse.dot(doubled_mean) / entry.mass;
+    // The first pass changed the nodes but not the points: its impulse meets what the nodes then give to the points.
+    const Vec<Dim> total = dt * forces_[i] + impulse;
+    const double given = (0.5 * impulse.dot(doubled_mean) - total.dot(entry.first_impulse)) / entry.mass;
     const double driven = partner.rigid ? impulse.dot(momenta_[node.partner]) / partner.mass : 0.0;
     patch.ledger.contact_dissipation += node.share * (driven - given);
     patch.ledger.boundary_work += node.share * driven;

@@ -112,11 +112,7 @@ void read_selection(Table& table, const Draft& draft, Drive& drive, int& given) 
     drive.overlapping = table.choice("overlapping", face_index_names, -1);
     if (drive.overlapping < 0) return;
     const int k = drive.overlapping / 2;
-    const bool upper = drive.overlapping % 2;
-    const auto reaches = [&](const BodySpec& body) {
-      const Bounds b = bounds(body.shape);
-      return upper ? b.upper[k] >= domain.upper[k] : b.lower[k] <= domain.lower[k];
-    };
+    const auto reaches = [&](const BodySpec& body) { return selects(drive, body, -1, domain); };
     if (k >= domain.dimension) {
       table.error("overlapping", "this face belongs to 3D; the case has dimension 2");
     } else if (domain.periodic[k]) {

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double deepest_overlap = 0.01;  // of the smaller radius, without a warning
 constexpr double least_width = 2.0;       // cells
+constexpr double on_face = 1e-6;          // cells; a body this near to a face sits on it on purpose
 
 struct Disc {
   Vec3 centre;
@@ -117,7 +118,55 @@ double smallest_cell(const Domain& d) {
   return least;
 }
 
+/// Cells between a body and the nearest fixed face that holds it although the body does not sit on it, and that face;
+/// -1 when there is none.
+std::pair<double, int> gap_to_fixed_face(const BodySpec& body, const Case& c) {
+  const Bounds b = bounds(body.shape);
+  std::pair<double, int> nearest{1.0, -1};
+  for (int face = 0; face < 2 * c.domain.dimension; ++face) {
+    if (c.faces[face].type != FaceType::fixed) continue;
+    const int k = face / 2;
+    const double cell = (c.domain.upper[k] - c.domain.lower[k]) / c.domain.cells[k];
+    const double gap = (face % 2 ? c.domain.upper[k] - b.upper[k] : b.lower[k] - c.domain.lower[k]) / cell;
+    if (gap > on_face && gap < nearest.first) nearest = {gap, face};
+  }
+  return nearest;
+}
+
+/// Moves as prescribed, whatever the faces do.
+bool is_prescribed(const Case& c, int index) {
+  const BodySpec& body = c.bodies[index];
+  return c.materials[body.material].model == "rigid" ||
+         std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, index, c.domain); });
+}
+
+void warn_about_fixed_faces(Case& c) {
+  std::int64_t count = 0;
+  std::string first;
+  for (int i = 0; i < std::ssize(c.bodies); ++i) {
+    const auto [gap, face] = gap_to_fixed_face(c.bodies[i], c);
+    if (face < 0 || is_prescribed(c, i)) continue;
+    if (count++ == 0)
+      first = fmt::format("{}: body {} lies {:.2g} cells from the fixed face {}", c.bodies[i].source, i, gap,
+                          face_names[face]);
+  }
+  if (count > 0)
+    c.warnings.push_back(fmt::format(
+        "{}; {} of {} bodies lie within one cell of a fixed face, which holds them fast from there; leave more room, "
+        "let them touch or cross the face, or use smaller cells",
+        first, count, c.bodies.size()));
+}
+
 }  // namespace
+
+bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain) {
+  if (drive.overlapping < 0)
+    return std::ranges::find(drive.ids, index) != drive.ids.end() ||
+           (!drive.group.empty() && body.group == drive.group);
+  const Bounds b = bounds(body.shape);
+  const int k = drive.overlapping / 2;
+  return drive.overlapping % 2 ? b.upper[k] > domain.upper[k] : b.lower[k] < domain.lower[k];
+}
 
 std::string placement_problem(const Shape& shape, const Domain& domain) {
   const Bounds b = bounds(shape);
@@ -171,6 +220,7 @@ void warn_about_bodies(Case& result) {
                     "will start under stress or share their points' room",
                     bodies[search.first_a].source, search.first_a, search.first_b, bodies[search.first_b].source,
                     search.depth, search.count, deepest_overlap));
+  warn_about_fixed_faces(result);
 }
 
 }  // namespace cairn::reading

@@ -30,6 +30,8 @@ inline constexpr Named<Passes> passes_names[] = {
     {"both", Passes::both}, {"before", Passes::before}, {"after", Passes::after}};
 inline constexpr Named<FaceType> face_type_names[] = {
     {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
+inline constexpr Named<Partition> partition_names[] = {{"metis", Partition::metis},
+                                                       {"round_robin", Partition::round_robin}};
 inline constexpr Named<int> face_index_names[] = {{"left", 0}, {"right", 1}, {"bottom", 2},
                                                   {"top", 3},  {"back", 4},  {"front", 5}};
 inline constexpr Named<CompoundOperation> compound_names[] = {{"union", CompoundOperation::union_of},

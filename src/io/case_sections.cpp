@@ -1,4 +1,4 @@
-// [domain], [time], [solver], [contact], [boundary] and [output].
+// [domain], [time], [solver], [contact], [boundary], [parallel] and [output].
 
 #include "case_sections.hpp"
 
@@ -217,6 +217,11 @@ void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& fa
     }
   }
   boundary.finish();
+}
+
+void read_parallel(Table parallel, Partition& partition) {
+  partition = parallel.choice("partition", partition_names, partition);
+  parallel.finish();
 }
 
 void read_output(Table output, const Draft& draft, Output& result) {

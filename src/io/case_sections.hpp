@@ -27,6 +27,7 @@ void read_time(Table time, Time& result);
 void read_solver(Table solver, int dimension, SolverOptions& result);
 void read_contact(Table contact, const std::vector<Material>& materials, ContactOptions& result);
 void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& faces);
+void read_parallel(Table parallel, Partition& partition);
 void read_output(Table output, const Draft& draft, Output& result);
 void read_materials(Table materials, std::vector<Material>& result);
 /// The shape a table describes; nothing after an error.
@@ -50,7 +51,9 @@ Vec3 read_angular_velocity(Table& table, int dimension);
 
 /// What is wrong with the place of a body; empty when nothing is.
 std::string placement_problem(const Shape& shape, const Domain& domain);
-/// Adds the warnings: overlapping balls, bodies thinner than two cells.
+/// True where the drive selects body number `index`: the same rule as at set-up.
+bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain);
+/// Adds the warnings: overlapping balls, bodies thinner than two cells, bodies held by a fixed face.
 void warn_about_bodies(Case& result);
 
 /// The complete case file of a draft.

@@ -202,6 +202,11 @@ void write_boundary(Writer& out, const Case& c) {
   }
 }
 
+void write_parallel(Writer& out, Partition partition) {
+  out.section("[parallel]");
+  out.key("partition", name_of(partition_names, partition));
+}
+
 void write_schedule(Writer& out, std::string_view name, const Schedule& s, const std::string& more = {}) {
   std::vector<std::string> parts;
   if (s.every > 0) parts.push_back("every = " + text_of(s.every));
@@ -233,6 +238,7 @@ std::string write_case(const Draft& draft) {
   write_contact(out, c);
   write_bodies(out, draft);
   write_boundary(out, c);
+  write_parallel(out, c.partition);
   write_output(out, c.output);
   return out.take();
 }

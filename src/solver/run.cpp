@@ -4,6 +4,7 @@
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/history.hpp"
 #include "cairn/io/progress.hpp"
+#include "cairn/io/result_files.hpp"
 #include "cairn/io/table_file.hpp"
 #include "cairn/solver/body_states.hpp"
 #include "cairn/solver/output.hpp"
@@ -115,12 +116,13 @@ class Run {
  private:
   void open_files() {
     std::string error;
-    if (rank_ == 0) {
+    if (rank_ == 0 && settings_.overwrite) error = remove_results(settings_.out);
+    if (rank_ == 0 && error.empty()) {
       std::ofstream(settings_.out / "case.toml") << case_.resolved;
       history_ = CsvWriter(settings_.out / "history.csv", history_columns(Dim));
       if (!case_.output.track.empty()) bodies_ = CsvWriter(settings_.out / "bodies.csv", body_columns(Dim));
     }
-    throw_together(comm_, history_.error() + bodies_.error());
+    throw_together(comm_, error + history_.error() + bodies_.error());
   }
 
   /// Writes what is due; with `all`, everything that is active and not written at this step yet.

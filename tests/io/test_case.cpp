@@ -176,6 +176,8 @@ group = "g"
 [boundary]
 left = { type = "fixed", velocity = [0.0, 1.0] }
 right = { type = "wall", friction = inf }
+[parallel]
+partition = "round_robin"
 [output]
 particles = { every = 3, interval = 0.1, fields = ["position", "image"] }
 history = {}
@@ -214,6 +216,7 @@ track = [2, 0]
   EXPECT_EQ(again.drives[2].group, "g");
   EXPECT_EQ(again.faces[0].velocity, Vec3(0, 1, 0));
   EXPECT_EQ(again.faces[2].type, FaceType::periodic);
+  EXPECT_EQ(again.partition, Partition::round_robin);
   EXPECT_FALSE(again.output.history.active());
   EXPECT_EQ(again.output.particles.fields, std::vector<std::string>{"image"});
   EXPECT_EQ(again.output.track, (std::vector{2, 0}));

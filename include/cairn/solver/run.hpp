@@ -14,6 +14,7 @@ struct RunSettings {
   std::filesystem::path out;  // folder of the results; exists
   std::string restart;        // empty: from the start; "latest": the last checkpoint in `out`; else a checkpoint file
   bool profile = false;       // report where the time went
+  bool overwrite = false;     // remove the results of an earlier run from `out`, once the case has been set up
 };
 
 /// Runs the case. Collective. Returns the exit code: 0 done, 4 stopped by a signal after a checkpoint.
