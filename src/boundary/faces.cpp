@@ -162,7 +162,7 @@ void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice
           const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(node) * N::width;
           if (!(sums[N::mass] > 0)) continue;
           entries_.push_back({static_cast<int>(k), node, 2 * d + side, first, sums[N::mass], filled,
-                              lattice.owns_node(patch.id, place), {}, faces[2 * d + side].friction[bodies[piece.body].material]});
+                              lattice.owns_node(patch.id, place), {}, faces[2 * d + side].friction[bodies[piece.body].material], {}});
         }
       });
     }
@@ -197,34 +197,45 @@ void WallContact<Dim>::first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& 
       const Vec<Dim> F = vector_of<Dim>(piece.nodes.force, entry.node);
       entry.decision = contact::decide_by_reaction<Dim>(P, F, n, entry.law.friction, dt);
     }
-    if (settings.options.passes != Passes::after) momentum += impulse(entry, momentum, faces, settings, false);
+    entry.record.projected = momentum;
+    if (settings.options.passes == Passes::after) continue;
+    entry.record.first = impulse(entry, momentum, faces, settings, false);
+    momentum += entry.record.first;
   }
 }
 
 template <int Dim>
 void WallContact<Dim>::second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
-                                   const ContactSettings<Dim>& settings, double dt) {
-  for (const Entry& entry : entries_) {
+                                   const ContactSettings<Dim>& settings, double dt, bool last) {
+  for (Entry& entry : entries_) {
     Piece<Dim>& piece = patch.pieces[entry.piece];
     auto force = vector_of<Dim>(piece.nodes.force, entry.node);
-    const Vec<Dim> before = momentum_of(piece, entry.node), momentum = before + dt * force;
-    const Vec<Dim> given = impulse(entry, momentum, faces, settings, true);
-    force += given / dt;
-    if (!entry.owned || given.isZero(0)) continue;
-    const double work = given.dot(faces[entry.face].velocity);
-    patch.ledger.boundary_work += work;
-    patch.ledger.contact_dissipation += work - 0.5 * given.dot(before + momentum + given) / entry.mass;
-    ++patch.ledger.contact_nodes;
+    const Vec<Dim> momentum = momentum_of(piece, entry.node) + dt * force;
+    entry.record.force = force;
+    entry.record.second = impulse(entry, momentum, faces, settings, true);
+    force += entry.record.second / dt;
+    patch.ledger.contact_nodes += entry.owned && !entry.record.second.isZero(0);
+    if (last) keep_ledger(entry, patch, faces, entry.record.given(entry.mass, dt));
   }
 }
 
 template <int Dim>
-void WallContact<Dim>::repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings) {
-  if (settings.options.passes == Passes::after) return;
+void WallContact<Dim>::repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
+                                   const ContactSettings<Dim>& settings, double dt) {
   for (const Entry& entry : entries_) {
     auto momentum = vector_of<Dim>(patch.pieces[entry.piece].nodes.velocity, entry.node);
-    momentum += impulse(entry, momentum, faces, settings, false);
+    const Vec<Dim> again = momentum, repeat = impulse(entry, again, faces, settings, false);
+    momentum += repeat;
+    keep_ledger(entry, patch, faces, entry.record.given(entry.mass, dt, again, repeat));
   }
+}
+
+template <int Dim>
+void WallContact<Dim>::keep_ledger(const Entry& entry, Patch<Dim>& patch, const FaceConditions<Dim>& faces, double given) const {
+  if (!entry.owned) return;
+  const double work = entry.record.second.dot(faces[entry.face].velocity);
+  patch.ledger.boundary_work += work;
+  patch.ledger.contact_dissipation += work - given;
 }
 
 #define CAIRN_INSTANTIATE(Dim)                                                                                          \

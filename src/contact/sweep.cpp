@@ -11,6 +11,16 @@ template <int Dim>
 using Node = Eigen::Map<Vec<Dim>>;
 
 template <int Dim>
+Node<Dim> momentum_of(Piece<Dim>& piece, int node) {
+  return Node<Dim>(piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width + NodeSums<Dim>::momentum);
+}
+
+template <int Dim>
+Node<Dim> vector_of(AlignedDoubles& vectors, int node) {
+  return Node<Dim>(vectors.data() + static_cast<std::size_t>(node) * vector_width);
+}
+
+template <int Dim>
 const double* sums_at(const Piece<Dim>& piece, int node) {
   return piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width;
 }
@@ -254,66 +264,71 @@ void ContactSweep<Dim>::first_pass(Patch<Dim>& patch, const Lattice<Dim>& lattic
   for (const auto& node : shared_) {
     load_node(node, patch, Pass::first, dt);
     resolve(node, lattice, settings, dt, Pass::first);
-    if (settings.options.passes == Passes::after) continue;
     for (int i = 0; i < node.count; ++i) {
       auto& entry = entries_[node.first + i];
-      if (entry.rigid) continue;
-      auto& sums = patch.pieces[entry.piece].nodes.sums;
-      Node<Dim>(sums.data() + static_cast<std::size_t>(entry.node) * NodeSums<Dim>::width + NodeSums<Dim>::momentum) +=
-          impulses_[i];
-      entry.first_impulse = impulses_[i];
+      entry.record.projected = momenta_[i];
+      if (entry.rigid || settings.options.passes == Passes::after) continue;
+      entry.record.first = impulses_[i];
+      momentum_of(patch.pieces[entry.piece], entry.node) += impulses_[i];
     }
   }
 }
 
 template <int Dim>
 void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                                    double dt) {
+                                    double dt, bool last) {
+  const bool only_first = settings.options.passes == Passes::before;
   patch.ledger.contact_nodes = 0;
   for (const auto& node : shared_) {
     load_node(node, patch, Pass::second, dt);
-    if (settings.options.passes == Passes::before)
-      // The first pass is then the only one: its impulse is given to the points instead of to the nodes.
-      for (int i = 0; i < node.count; ++i) {
-        auto& entry = entries_[node.first + i];
-        impulses_[i] = entry.first_impulse;
-        if (!entry.rigid)
-          Node<Dim>(patch.pieces[entry.piece].nodes.sums.data() +
-                    static_cast<std::size_t>(entry.node) * NodeSums<Dim>::width + NodeSums<Dim>::momentum) -= impulses_[i];
-      }
-    else
-      resolve(node, lattice, settings, dt, Pass::second);
+    if (!only_first) resolve(node, lattice, settings, dt, Pass::second);
+    bool touched = false;
     for (int i = 0; i < node.count; ++i) {
-      const auto& entry = entries_[node.first + i];
+      auto& entry = entries_[node.first + i];
       if (entry.rigid) continue;
-      Node<Dim>(patch.pieces[entry.piece].nodes.force.data() + static_cast<std::size_t>(entry.node) * vector_width) +=
-          impulses_[i] / dt;
+      auto& piece = patch.pieces[entry.piece];
+      if (only_first) {  // its impulse goes to the points, and no longer to the nodes
+        impulses_[i] = entry.record.first;
+        momentum_of(piece, entry.node) -= impulses_[i];
+      }
+      entry.record.force = forces_[i];
+      entry.record.second = impulses_[i];
+      vector_of<Dim>(piece.nodes.force, entry.node) += impulses_[i] / dt;
+      touched = touched || !impulses_[i].isZero(0);
     }
-    if (node.share > 0) keep_ledger(node, patch, dt);
+    patch.ledger.contact_nodes += touched && node.share > 0;
     if (node.share > 0 && settings.keep_contacts) keep_pairs(node, patch, lattice);
+    if (last) keep_ledger(node, patch, dt, false);
   }
 }
 
 template <int Dim>
-void ContactSweep<Dim>::keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt) const {
+void ContactSweep<Dim>::repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
+                                    double dt) {
+  for (const auto& node : shared_) {
+    load_node(node, patch, Pass::repeat, dt);
+    resolve(node, lattice, settings, dt, Pass::repeat);
+    for (int i = 0; i < node.count; ++i) {
+      const auto& entry = entries_[node.first + i];
+      if (!entry.rigid) vector_of<Dim>(patch.pieces[entry.piece].nodes.velocity, entry.node) += impulses_[i];
+    }
+    keep_ledger(node, patch, dt, true);
+  }
+}
+
+template <int Dim>
+void ContactSweep<Dim>::keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt, bool projected_again) const {
+  if (node.share == 0) return;
   const auto& partner = entries_[node.first + node.partner];
-  bool touched = false;
   for (int i = 0; i < node.count; ++i) {
     const auto& entry = entries_[node.first + i];
     if (entry.rigid) continue;
-    const Vec<Dim>& impulse = impulses_[i];
-    touched = touched || !impulse.isZero(0);
-    // The nodes' mean velocity over the step, from after the first pass on: strains see the same velocities, so that the
-    // energy given to the points and that taken from their strain are of one book.
-    const Vec<Dim> doubled_mean = 2 * momenta_[i] - dt * forces_[i] + impulse;
-    // The first pass changed the nodes but not the points: its impulse meets what the nodes then give to the points.
-    const Vec<Dim> total = dt * forces_[i] + impulse;
-    const double given = (0.5 * impulse.dot(doubled_mean) - total.dot(entry.first_impulse)) / entry.mass;
-    const double driven = partner.rigid ? impulse.dot(momenta_[node.partner]) / partner.mass : 0.0;
+    const double given = projected_again ? entry.record.given(entry.mass, dt, momenta_[i], impulses_[i])
+                                         : entry.record.given(entry.mass, dt);
+    const double driven = partner.rigid ? entry.record.second.dot(partner.record.projected) / partner.mass : 0.0;
     patch.ledger.contact_dissipation += node.share * (driven - given);
     patch.ledger.boundary_work += node.share * driven;
   }
-  patch.ledger.contact_nodes += touched;
 }
 
 template <int Dim>
@@ -331,22 +346,6 @@ void ContactSweep<Dim>::keep_pairs(const SharedNode& node, Patch<Dim>& patch, co
       sum[1 + d] += sign * node.share * impulses_[i][d];
       sum[1 + Dim + d] += size * lattice.node_position(d, node.place[d]);
       sum[1 + 2 * Dim + d] += sign * size * entry.normal[d];
-    }
-  }
-}
-
-template <int Dim>
-void ContactSweep<Dim>::repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                                    double dt) {
-  if (settings.options.passes == Passes::after && settings.options.release == Release::reaction) return;
-  for (const auto& node : shared_) {
-    load_node(node, patch, Pass::repeat, dt);
-    resolve(node, lattice, settings, dt, Pass::repeat);
-    for (int i = 0; i < node.count; ++i) {
-      const auto& entry = entries_[node.first + i];
-      if (entry.rigid) continue;
-      Node<Dim>(patch.pieces[entry.piece].nodes.velocity.data() + static_cast<std::size_t>(entry.node) * vector_width) +=
-          impulses_[i];
     }
   }
 }

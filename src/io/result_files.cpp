@@ -35,7 +35,7 @@ bool is_result_name(const std::string& name) {
 std::vector<fs::path> find_results(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code error;
-  if (!fs::exists(folder, error)) return found;
+  if (!fs::is_directory(folder, error)) return found;
   fs::directory_iterator entry(folder, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     std::error_code ignored;

@@ -24,7 +24,7 @@ void Simulation<Dim>::step(double longest) {
   project_points();
   contact_before_update();
   if (first) strain_first(share);
-  contact_after_update();
+  contact_after_update(!again);
   accelerate_points(again);
   if (again) project_again();
   if (update != StressUpdate::first) strain_last(share);
@@ -100,12 +100,12 @@ void Simulation<Dim>::strain_first(double share) {
 }
 
 template <int Dim>
-void Simulation<Dim>::contact_after_update() {
+void Simulation<Dim>::contact_after_update(bool last) {
   {
     const auto time = timers_.measure(Stage::contact);
     for (std::size_t p = 0; p < patches_.size(); ++p) {
-      sweeps_[p].second_pass(patches_[p], lattice_, contact_, dt_);
-      walls_[p].second_pass(patches_[p], faces_, contact_, dt_);
+      sweeps_[p].second_pass(patches_[p], lattice_, contact_, dt_, last);
+      walls_[p].second_pass(patches_[p], faces_, contact_, dt_, last);
     }
   }
   const auto time = timers_.measure(Stage::integrate);
@@ -138,7 +138,7 @@ void Simulation<Dim>::project_again() {
   const auto time = timers_.measure(Stage::contact);
   for (std::size_t p = 0; p < patches_.size(); ++p) {
     sweeps_[p].repeat_pass(patches_[p], lattice_, contact_, dt_);
-    walls_[p].repeat_pass(patches_[p], faces_, contact_);
+    walls_[p].repeat_pass(patches_[p], faces_, contact_, dt_);
   }
   for_pieces([&](Piece<Dim>& piece) { velocity_from_momentum(piece); });
   for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_);

@@ -98,6 +98,7 @@ TEST_F(CaseFile, FillsInTheDefaults) {
   EXPECT_EQ(c.contact.normals, NormalSource::volume_gradient);
   EXPECT_TRUE(c.contact.pairs.empty());
   EXPECT_EQ(c.faces[0].type, FaceType::free);
+  EXPECT_EQ(c.partition, Partition::metis);
   EXPECT_EQ(c.output.history.every, 10);
   EXPECT_FALSE(c.output.particles.active());
   EXPECT_EQ(c.output.particles.fields,

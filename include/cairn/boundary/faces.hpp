@@ -45,8 +45,8 @@ class WallContact {
   void find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
             const ContactSettings<Dim>& settings, const ContactSweep<Dim>& sweep, const std::vector<Body>& bodies);
   void first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt);
-  void second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt);
-  void repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings);
+  void second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt, bool last);
+  void repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt);
 
  private:
   struct Entry {
@@ -56,7 +56,9 @@ class WallContact {
     bool open, owned;
     contact::Decision decision;
     PairLaw law;
+    contact::NodeRecord<Dim> record;
   };
+  void keep_ledger(const Entry& entry, Patch<Dim>& patch, const FaceConditions<Dim>& faces, double given) const;
   Vec<Dim> impulse(const Entry& entry, const Vec<Dim>& momentum, const FaceConditions<Dim>& faces,
                    const ContactSettings<Dim>& settings, bool second) const;
   std::vector<Entry> entries_;

@@ -8,6 +8,7 @@
 
 #include "cairn/body/patch.hpp"
 #include "cairn/contact/laws.hpp"
+#include "cairn/contact/ledger.hpp"
 
 namespace cairn {
 
@@ -47,7 +48,7 @@ struct ContactEntry {
   bool compressive = false, stress_free = false;
   PairLaw law;
   Vec<Dim> normal = Vec<Dim>::Zero();         // out of the body
-  Vec<Dim> first_impulse = Vec<Dim>::Zero();  // given in the first pass
+  contact::NodeRecord<Dim> record;
 };
 
 template <int Dim>
@@ -59,9 +60,10 @@ class ContactSweep {
 
   /// Before the momentum update: changes the momenta in the sums; decides by reaction.
   void first_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
-  /// After p += dt f: changes the forces, so that points and nodes agree; keeps the ledger.
-  void second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
-  /// On momenta projected again (NodeBox::velocity, before division by mass).
+  /// After p += dt f: changes the forces, so that points and nodes agree. With `last`, no repeat pass follows in this step,
+  /// and the ledger is closed here.
+  void second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt, bool last);
+  /// On momenta projected again (NodeBox::velocity, before division by mass); closes the ledger.
   void repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
 
   /// Volume of all bodies at a node of the patch [m^Dim].
@@ -89,7 +91,7 @@ class ContactSweep {
   void resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt, Pass pass);
   void load_node(const SharedNode& node, const Patch<Dim>& patch, Pass pass, double dt);
   void keep_pairs(const SharedNode& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
-  void keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt) const;
+  void keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt, bool projected_again) const;
 
   Box<Dim> box_;
   std::vector<std::int32_t> bodies_at_;  // bodies at each node of the patch; later the node's place in shared_

@@ -75,7 +75,7 @@ class Simulation {
   void project_points();                 // (*)
   void contact_before_update();
   void strain_first(double share);       // (*)
-  void contact_after_update();
+  void contact_after_update(bool last);
   void accelerate_points(bool again);
   void project_again();                  // (*)
   void strain_last(double share);

@@ -1,0 +1,90 @@
+"""What the tests of the whole program share: running it on any number of ranks, and comparing result folders."""
+
+import dataclasses
+import importlib.machinery
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SKIP = 77  # exit code of a test that cannot run here
+
+# Lines of mpirun about an exit code that is not 0.
+NOISE = ("-----", "Primary job", "a non-zero", "mpirun detected", "the job to be", "Process name", "Exit code",
+         "Per user-direction")
+
+
+@dataclasses.dataclass
+class Done:
+    """What a command did; code 'hang' if it did not end."""
+
+    code: object
+    out: str
+    err: str  # without mpirun's own words
+
+    @property
+    def last(self) -> str:
+        """The last line of standard output."""
+        lines = self.out.splitlines()
+        return lines[-1] if lines else ""
+
+
+class Program:
+    """The program under test, and how to run it."""
+
+    def __init__(self, exe: str):
+        self.exe = str(Path(exe).resolve())
+        self.mpirun = os.environ.get("CAIRN_MPIRUN") or shutil.which("mpirun")
+        if not self.mpirun:
+            print("mpirun was not found")
+            sys.exit(SKIP)
+        for key, value in (("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
+                           ("OMPI_MCA_mpi_yield_when_idle", "1"), ("OMPI_MCA_btl_vader_single_copy_mechanism", "none")):
+            os.environ.setdefault(key, value)
+
+    def command(self, *arguments, ranks: int = 1) -> list[str]:
+        launcher = [] if ranks == 1 else [self.mpirun, "--oversubscribe", "-n", str(ranks)]
+        return launcher + [self.exe, *map(str, arguments)]
+
+    def __call__(self, *arguments, ranks: int = 1, cwd: Path | None = None, timeout: float = 120, **options) -> Done:
+        """Runs `cairn ARGUMENTS`; `options` go to subprocess.run."""
+        try:
+            done = subprocess.run(self.command(*arguments, ranks=ranks), cwd=cwd, capture_output=True, timeout=timeout,
+                                  check=False, **options)
+        except subprocess.TimeoutExpired:
+            return Done("hang", "", "")
+        lines = done.stderr.decode(errors="replace").splitlines()
+        err = "\n".join(line for line in lines if line.strip() and not line.strip().startswith(NOISE))
+        return Done(done.returncode, done.stdout.decode(errors="replace"), err)
+
+
+def sets(values: dict) -> list[str]:
+    """{'time.steps': 5} as --set arguments; the values are TOML."""
+    return [word for key, value in values.items() for word in ("--set", f"{key}={value}")]
+
+
+def load_compare_runs():
+    """scripts/compare-runs as a module; ends the test as skipped where its packages are missing."""
+    for name in ("h5py", "numpy"):
+        if importlib.util.find_spec(name) is None:
+            print(f"Python lacks {name}")
+            sys.exit(SKIP)
+    path = str(ROOT / "scripts" / "compare-runs")
+    loader = importlib.machinery.SourceFileLoader("compare_runs", path)
+    spec = importlib.util.spec_from_loader("compare_runs", loader)
+    module = importlib.util.module_from_spec(spec)
+    dont_write, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no cache among the scripts
+    loader.exec_module(module)
+    sys.dont_write_bytecode = dont_write
+    return module
+
+
+def fresh_folder(path: str) -> Path:
+    """An empty folder of that name."""
+    folder = Path(path).resolve()
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder

@@ -1,0 +1,417 @@
+// Constitutive laws against their energies, closed forms and invariances.
+
+#include "../support/tensors.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "cairn/core/error.hpp"
+#include "cairn/material/registry.hpp"
+
+namespace cairn {
+namespace {
+
+using namespace test;
+
+const double G = 30e6, K = 70e6, Y = 0.2e6, H = 5e6;  // [Pa]
+const ParameterValues values = {{"shear_modulus", G}, {"bulk_modulus", K}, {"yield_stress", Y}, {"hardening_modulus", H}};
+
+VonMises von_mises(double hardening) {
+  ParameterValues v = values;
+  v["hardening_modulus"] = hardening;
+  return VonMises(v);
+}
+
+/// One material point under a law.
+template <int Dim, class ConcreteLaw>
+struct Point {
+  ConcreteLaw law;
+  Mat3 F = Mat3::Identity(), stress = Mat3::Zero();
+  double state[8] = {};
+
+  /// Advances F by A = dt L and the stress with it; `J` as given, or that of F. Returns what the law returns.
+  double advance(const Mat3& A, double J = -1) {
+    const auto new_F = advance_deformation(tensor<Dim>(A), tensor<Dim>(F));
+    F = matrix(new_F);
+    auto s = symmetric<Dim>(stress);
+    const double modulus = law.update(tensor<Dim>(A), new_F, J > 0 ? J : F.determinant(), s, state);
+    stress = matrix(s);
+    return modulus;
+  }
+};
+
+/// Stress of small strain `e` by Hooke's law.
+Mat3 hooke(const Mat3& e) { return 2 * G * e + (K - 2 * G / 3) * e.trace() * Mat3::Identity(); }
+
+template <int Dim>
+Mat3 neo_hookean_stress(const Mat3& F) {
+  Symmetric<Dim, double> s{};
+  double* none = nullptr;
+  NeoHookean(values).update(Tensor<Dim, double>{}, tensor<Dim>(F), F.determinant(), s, none);
+  return matrix(s);
+}
+
+// Neo-Hookean ---------------------------------------------------------------------------------------------------------
+
+/// First Piola stress J sigma F^-T against dW/dF by central differences.
+template <int Dim>
+void check_energy_derivative() {
+  Random random;
+  const NeoHookean law(values);
+  const double h = 1e-5;
+  for (int k = 0; k < 20; ++k) {
+    const Mat3 F = Mat3::Identity() + random_matrix<Dim>(random, 0.3);
+    const Mat3 P = F.determinant() * neo_hookean_stress<Dim>(F) * F.inverse().transpose();
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        if (!stored<Dim>(i, j)) continue;
+        Mat3 up = F, down = F;
+        up(i, j) += h, down(i, j) -= h;
+        const double slope = (law.strain_energy(tensor<Dim>(up), nullptr) - law.strain_energy(tensor<Dim>(down), nullptr)) / (2 * h);
+        EXPECT_NEAR(P(i, j), slope, 2e-8 * (P.norm() + G));
+      }
+  }
+}
+TEST(NeoHookeanLaw, StressIsTheDerivativeOfTheEnergy) {
+  check_energy_derivative<2>();
+  check_energy_derivative<3>();
+}
+
+TEST(NeoHookeanLaw, ReferenceIsFreeOfStressAndEnergy) {
+  EXPECT_LE(neo_hookean_stress<2>(Mat3::Identity()).norm(), 1e-15 * K);
+  EXPECT_LE(neo_hookean_stress<3>(Mat3::Identity()).norm(), 1e-15 * K);
+  EXPECT_NEAR(NeoHookean(values).strain_energy(tensor<3>(Mat3::Identity()), nullptr), 0, 1e-15 * K);
+}
+
+TEST(NeoHookeanLaw, DilationAndSimpleShearInClosedForm) {
+  // F = a I: sigma = K/2 (a^3 - a^-3) I. Simple shear g: J = 1, sigma_xy = G g, sigma_xx - sigma_yy = G g^2.
+  const double a = 1.3, g = 0.7;
+  const Mat3 swollen = neo_hookean_stress<3>(a * Mat3::Identity());
+  EXPECT_LE((swollen - 0.5 * K * (a * a * a - 1 / (a * a * a)) * Mat3::Identity()).norm(), 1e-14 * K);
+  Mat3 F = Mat3::Identity();
+  F(0, 1) = g;
+  for (const Mat3& s : {neo_hookean_stress<2>(F), neo_hookean_stress<3>(F)}) {
+    EXPECT_NEAR(s(0, 1), G * g, 1e-14 * G);
+    EXPECT_NEAR(s(0, 0) - s(1, 1), G * g * g, 1e-14 * G);
+    EXPECT_NEAR(s.trace(), 0, 1e-14 * K);
+  }
+}
+
+template <int Dim>
+void check_rotated_stress() {
+  Random random;
+  for (int k = 0; k < 50; ++k) {
+    const Mat3 F = Mat3::Identity() + random_matrix<Dim>(random, 0.3), R = random_rotation<Dim>(random);
+    const Mat3 s = neo_hookean_stress<Dim>(F);
+    EXPECT_LE((neo_hookean_stress<Dim>(R * F) - R * s * R.transpose()).norm(), 1e-13 * (s.norm() + G));
+    EXPECT_LE((neo_hookean_stress<Dim>(F * R) - s).norm(), 1e-13 * (s.norm() + G));  // isotropic
+  }
+}
+TEST(NeoHookeanLaw, TurnsWithTheBodyAndIsIsotropic) {
+  check_rotated_stress<2>();
+  check_rotated_stress<3>();
+}
+
+// Small strain --------------------------------------------------------------------------------------------------------
+
+/// Strains: uniaxial, shear, hydrostatic (within what the dimension can hold), general.
+template <int Dim>
+std::vector<Mat3> strains(double size) {
+  Random random;
+  Mat3 uniaxial = Mat3::Zero(), shear = Mat3::Zero();
+  uniaxial(0, 0) = size;
+  shear(0, 1) = shear(1, 0) = size;
+  return {uniaxial, -uniaxial, shear, size * Mat3::Identity(), random_symmetric<Dim>(random, size)};
+}
+
+template <int Dim, class ConcreteLaw>
+void check_small_strain(const ConcreteLaw& law, double tolerance) {
+  for (const Mat3& e : strains<Dim>(1e-7)) {
+    Point<Dim, ConcreteLaw> point{law};
+    const double modulus = point.advance(e);
+    EXPECT_LE((point.stress - hooke(e)).norm(), tolerance * hooke(e).norm());
+    EXPECT_NEAR(modulus, K + 4 * G / 3, 1e-6 * K);
+  }
+}
+TEST(Laws, FollowHookeAtSmallStrain) {
+  check_small_strain<2>(NeoHookean(values), 1e-6);
+  check_small_strain<3>(NeoHookean(values), 1e-6);
+  check_small_strain<2>(Hypoelastic(values), 1e-14);
+  check_small_strain<3>(Hypoelastic(values), 1e-14);
+  check_small_strain<2>(VonMises(values), 1e-14);
+  check_small_strain<3>(VonMises(values), 1e-14);
+}
+
+TEST(Laws, PlaneStrainIsThreeDimensional) {
+  Random random;
+  for (int k = 0; k < 20; ++k) {
+    const Mat3 A = random_matrix<2>(random, 0.05);
+    Point<2, VonMises> flat{VonMises(values)};
+    Point<3, VonMises> solid{VonMises(values)};
+    for (int i = 0; i < 5; ++i) flat.advance(A), solid.advance(A);
+    EXPECT_LE((flat.stress - solid.stress).norm(), 1e-12 * solid.stress.norm());
+    EXPECT_NEAR(flat.state[0], solid.state[0], 1e-13);
+  }
+}
+
+// Rotation ------------------------------------------------------------------------------------------------------------
+
+/// A stressed point turned rigidly through ten turns keeps its invariants; after n steps it is turned by n 2 atan(w/2).
+template <int Dim, class ConcreteLaw>
+void check_rigid_rotation(const ConcreteLaw& law) {
+  const int steps = 1000;
+  const double w = 10 * 2 * std::numbers::pi / steps;
+  Random random;
+  Point<Dim, ConcreteLaw> point{law};
+  point.advance(random_symmetric<Dim>(random, 1e-3));
+  const Mat3 start = point.stress;
+  const Vec3 axis = Dim == 2 ? Vec3(Vec3::UnitZ()) : Vec3(Vec3(1, 2, -0.5).normalized());
+  Mat3 cross;
+  cross << 0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0;
+  const double work = point.state[std::is_same_v<ConcreteLaw, VonMises> ? 1 : 0];
+  for (int i = 0; i < steps; ++i) point.advance(w * cross);
+  EXPECT_NEAR(point.stress.trace(), start.trace(), 1e-12 * start.norm());
+  EXPECT_NEAR(point.stress.norm(), start.norm(), 1e-12 * start.norm());
+  EXPECT_NEAR(point.stress.determinant(), start.determinant(), 1e-12 * std::pow(start.norm(), 3));
+  const Mat3 R = Eigen::AngleAxisd(steps * 2 * std::atan(w / 2), axis).toRotationMatrix();
+  EXPECT_LE((point.stress - R * start * R.transpose()).norm(), 1e-11 * start.norm());
+  EXPECT_NEAR(point.state[std::is_same_v<ConcreteLaw, VonMises> ? 1 : 0], work, 1e-12 * work);
+}
+TEST(Laws, RigidRotationKeepsTheStress) {
+  check_rigid_rotation<2>(Hypoelastic(values));
+  check_rigid_rotation<3>(Hypoelastic(values));
+  check_rigid_rotation<2>(VonMises(values));
+  check_rigid_rotation<3>(VonMises(values));
+}
+
+/// A motion seen in a turned frame gives the turned stress.
+template <int Dim, class ConcreteLaw>
+void check_frame(const ConcreteLaw& law) {
+  Random random;
+  const Mat3 Q = random_rotation<Dim>(random);
+  Point<Dim, ConcreteLaw> point{law}, turned{law};
+  for (int i = 0; i < 20; ++i) {
+    const Mat3 A = random_matrix<Dim>(random, 0.02);
+    point.advance(A);
+    turned.advance(Q * A * Q.transpose());
+    EXPECT_LE((turned.stress - Q * point.stress * Q.transpose()).norm(), 1e-12 * (point.stress.norm() + G));
+  }
+  EXPECT_NEAR(turned.state[0], point.state[0], 1e-12 * std::abs(point.state[0]));
+}
+TEST(Laws, KnowNoPreferredDirection) {
+  check_frame<2>(NeoHookean(values));
+  check_frame<3>(NeoHookean(values));
+  check_frame<2>(Hypoelastic(values));
+  check_frame<3>(Hypoelastic(values));
+  check_frame<2>(VonMises(values));
+  check_frame<3>(VonMises(values));
+}
+
+// Plasticity ----------------------------------------------------------------------------------------------------------
+
+template <int Dim>
+void check_yield_surface() {
+  Random random;
+  for (double hardening : {0.0, H}) {
+    Point<Dim, VonMises> point{von_mises(hardening)};
+    int yielded = 0;
+    for (int i = 0; i < 200; ++i) {
+      const double before = point.state[0];
+      const double pressure = point.stress.trace();
+      const Mat3 A = random_matrix<Dim>(random, 5e-3);
+      point.advance(A, 1.0);
+      const double limit = Y + hardening * point.state[0];
+      EXPECT_GE(point.state[0], before);
+      if (point.state[0] > before) {
+        ++yielded;
+        EXPECT_NEAR(von_mises_stress(point.stress), limit, 1e-12 * limit);
+      } else {
+        EXPECT_LE(von_mises_stress(point.stress), limit * (1 + 1e-13));
+      }
+      EXPECT_NEAR(point.stress.trace() - pressure, 3 * K * A.trace(), 1e-11 * K);  // no plastic volume change
+    }
+    EXPECT_GT(yielded, 50);
+  }
+}
+TEST(VonMisesLaw, ReturnsToTheYieldSurface) {
+  check_yield_surface<2>();
+  check_yield_surface<3>();
+}
+
+/// Return by the shortest way: the deviator keeps the direction of the elastic predictor.
+TEST(VonMisesLaw, ReturnIsRadial) {
+  Random random;
+  for (int k = 0; k < 20; ++k) {
+    Point<3, VonMises> plastic{von_mises(H)};
+    Point<3, Hypoelastic> elastic{Hypoelastic(values)};
+    const Mat3 A = random_symmetric<3>(random, 0.1);
+    plastic.advance(A), elastic.advance(A);
+    const auto deviator = [](const Mat3& s) { return Mat3(s - s.trace() / 3 * Mat3::Identity()); };
+    ASSERT_GT(plastic.state[0], 0);
+    EXPECT_LE((deviator(plastic.stress).normalized() - deviator(elastic.stress).normalized()).norm(), 1e-13);
+    // Equivalent plastic strain: what the elastic predictor lies beyond the surface, over 3G + H.
+    const double excess = von_mises_stress(elastic.stress) - Y;
+    EXPECT_NEAR(plastic.state[0], excess / (3 * G + H), 1e-13);
+  }
+}
+
+/// Uniaxial strain: q = 2G e up to Y, then q = Y + H p with p = (2G e - Y)/(3G + H); sigma = K e + 2/3 q.
+TEST(VonMisesLaw, UniaxialStrainFollowsTheClosedForm) {
+  const double longest = 20 * Y / (2 * G);
+  for (int direction = 0; direction < 2; ++direction)
+    for (double sign : {1.0, -1.0}) {
+      Point<2, VonMises> point{von_mises(H)};
+      Mat3 A = Mat3::Zero();
+      const int steps = 80;
+      A(direction, direction) = sign * longest / steps;
+      for (int i = 1; i <= steps; ++i) {
+        point.advance(A, 1.0);
+        const double e = longest * i / steps, p = std::max(0.0, (2 * G * e - Y) / (3 * G + H));
+        const double q = p > 0 ? Y + H * p : 2 * G * e;
+        EXPECT_NEAR(point.stress(direction, direction), sign * (K * e + 2.0 / 3 * q), 1e-12 * K * longest);
+        EXPECT_NEAR(point.stress(1 - direction, 1 - direction), sign * (K * e - q / 3), 1e-12 * K * longest);
+        EXPECT_NEAR(point.state[0], p, 1e-14);
+      }
+    }
+}
+
+/// Elastic energy in closed form, from the stress.
+double elastic_energy(const Mat3& s) {
+  const double q = von_mises_stress(s);
+  return s.trace() * s.trace() / (18 * K) + q * q / (6 * G);
+}
+
+/// Monotonic uniaxial strain to 20 yield strains in `steps` steps; yield falls on the end of a step.
+Point<3, VonMises> strained(double hardening, int steps) {
+  Point<3, VonMises> point{von_mises(hardening)};
+  Mat3 A = Mat3::Zero();
+  A(0, 0) = 20 * Y / (2 * G) / steps;
+  for (int i = 0; i < steps; ++i) point.advance(A, 1.0);
+  return point;
+}
+
+TEST(VonMisesLaw, PlasticWorkIsTheIntegral) {
+  // Perfectly plastic: Y p exactly. Hardening: Y p + H p^2/2, the error vanishing with the step at least linearly.
+  const auto perfect = strained(0.0, 40);
+  EXPECT_NEAR(perfect.state[2], Y * perfect.state[0], 1e-12 * perfect.state[2]);
+  double error[2];
+  for (int level = 0; level < 2; ++level) {
+    const auto point = strained(H, 200 << level);
+    const double p = point.state[0], exact = Y * p + 0.5 * H * p * p;
+    error[level] = std::abs(point.state[2] - exact) / exact;
+    EXPECT_EQ(point.law.plastic_work(point.state), point.state[2]);
+  }
+  EXPECT_LT(error[0], 5e-3);
+  EXPECT_LE(error[1], 0.51 * error[0] + 1e-13);
+}
+
+TEST(VonMisesLaw, EnergyBalances) {
+  // Stress work = strain energy + plastic work; the strain energy is that of the stress.
+  const auto perfect = strained(0.0, 40);
+  const auto energy = [](const Point<3, VonMises>& p) { return p.law.strain_energy(tensor<3>(p.F), p.state); };
+  EXPECT_NEAR(energy(perfect), elastic_energy(perfect.stress), 1e-11 * perfect.state[1]);
+  double error[2];
+  for (int level = 0; level < 2; ++level) {
+    const auto point = strained(H, 200 << level);
+    error[level] = std::abs(energy(point) - elastic_energy(point.stress)) / point.state[1];
+  }
+  EXPECT_LT(error[0], 2e-3);
+  EXPECT_LE(error[1], 0.51 * error[0] + 1e-13);
+}
+
+TEST(HypoelasticLaw, EnergyIsTheStressWork) {
+  Random random;
+  Point<3, Hypoelastic> point{Hypoelastic(values)};
+  const Mat3 e = random_symmetric<3>(random, 1e-4);
+  for (int i = 0; i < 10; ++i) point.advance(e, 1.0);
+  const double exact = 0.5 * (point.stress * (10 * e)).trace();
+  EXPECT_NEAR(point.law.strain_energy(tensor<3>(point.F), point.state), exact, 1e-13 * exact);
+  // The work belongs to a reference volume: a point of current volume J does J times as much.
+  Point<3, Hypoelastic> swollen{Hypoelastic(values)};
+  for (int i = 0; i < 10; ++i) swollen.advance(e, 1.7);
+  EXPECT_NEAR(swollen.state[0], 1.7 * exact, 1e-13 * exact);
+}
+
+// Lanes and the registry ----------------------------------------------------------------------------------------------
+
+template <int Dim, class ConcreteLaw>
+void check_lanes(const ConcreteLaw& law) {
+  Random random;
+  Tensor<Dim, double> A[lane_count], F[lane_count];
+  Symmetric<Dim, double> stress[lane_count];
+  for (int lane = 0; lane < lane_count; ++lane) {
+    A[lane] = tensor<Dim>(random_matrix<Dim>(random, lane < 4 ? 1e-3 : 1e-2));  // some yield, some do not
+    F[lane] = tensor<Dim>(Mat3::Identity() + random_matrix<Dim>(random, 0.1));
+    stress[lane] = symmetric<Dim>(random_symmetric<Dim>(random, lane % 2 == 0 ? 0.1 * Y : Y));
+  }
+  auto all_stress = gather_lanes(stress);
+  Lanes all_state[8];
+  for (int i = 0; i < 8; ++i) all_state[i] = broadcast(0.001);
+  const auto all_F = gather_lanes(F);
+  const Lanes modulus = law.update(gather_lanes(A), all_F, determinant(all_F), all_stress, all_state);
+  for (int lane = 0; lane < lane_count; ++lane) {
+    double state[8];
+    std::fill_n(state, 8, 0.001);
+    const double expected = law.update(A[lane], F[lane], determinant(F[lane]), stress[lane], state);
+    EXPECT_NEAR(modulus[lane], expected, 1e-13 * K);
+    for (int i = 0; i < symmetric_size<Dim>; ++i) EXPECT_NEAR(all_stress.c[i][lane], stress[lane].c[i], 1e-13 * K);
+    for (std::size_t i = 0; i < law.state_names.size(); ++i)
+      EXPECT_NEAR(all_state[i][lane], state[i], 1e-12 * std::abs(state[i]));
+  }
+}
+TEST(Laws, LanesMatchPlainNumbers) {
+  check_lanes<2>(NeoHookean(values));
+  check_lanes<3>(NeoHookean(values));
+  check_lanes<2>(Hypoelastic(values));
+  check_lanes<3>(Hypoelastic(values));
+  check_lanes<2>(VonMises(values));
+  check_lanes<3>(VonMises(values));
+}
+
+TEST(Registry, BuildsEveryLawFromItsTable) {
+  ASSERT_EQ(law_infos().size(), std::variant_size_v<Law>);
+  for (std::size_t i = 0; i < law_infos().size(); ++i) {
+    const LawInfo& info = law_infos()[i];
+    ParameterValues table;
+    for (const auto& parameter : info.parameters) {
+      EXPECT_FALSE(parameter.meaning.empty());
+      table[std::string(parameter.key)] = parameter.fallback.value_or(7.0);
+    }
+    const Law law = make_law(info.name, table);
+    EXPECT_EQ(law.index(), i) << info.name;
+    EXPECT_EQ(std::visit([](const auto& l) { return l.name; }, law), info.name);
+    for (const auto& parameter : info.parameters) {
+      ParameterValues incomplete = table;
+      incomplete.erase(std::string(parameter.key));
+      EXPECT_ANY_THROW(make_law(info.name, incomplete)) << info.name << " without " << parameter.key;
+    }
+  }
+}
+
+TEST(Registry, PassesParametersOn) {
+  const auto law = std::get<VonMises>(make_law("von_mises", values));
+  EXPECT_EQ(law.moduli.shear, G);
+  EXPECT_EQ(law.moduli.bulk, K);
+  EXPECT_EQ(law.yield_stress, Y);
+  EXPECT_EQ(law.hardening_modulus, H);
+  EXPECT_DOUBLE_EQ(law.moduli.longitudinal(), K + 4 * G / 3);
+}
+
+TEST(Registry, RefusesAnUnknownName) {
+  try {
+    make_law("rubber", values);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("rubber"), std::string::npos);
+  }
+}
+
+TEST(RigidLaw, NeverStressed) {
+  Point<3, Rigid> point{Rigid(values)};
+  EXPECT_EQ(point.advance(Mat3::Constant(0.1)), 0.0);
+  EXPECT_EQ(point.stress.norm(), 0.0);
+}
+
+}  // namespace
+}  // namespace cairn
