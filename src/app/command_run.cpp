@@ -34,7 +34,7 @@ void check_free(const fs::path& out) {
   throw InputError(fmt::format("--out: {}: holds results already ({}{}); choose another folder, or add --overwrite to "
                                "remove them",
                                out.string(), results[0].filename().string(),
-                               results.size() > 1 ? fmt::format(" and {} more files", results.size() - 1) : ""));
+                               results.size() > 1 ? fmt::format(" and {} more", results.size() - 1) : ""));
 }
 
 }  // namespace

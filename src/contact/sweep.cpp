@@ -138,21 +138,29 @@ void ContactSweep<Dim>::prepare(SharedNode& node, const Patch<Dim>& patch, const
     const bool heavy_enough = entry[i].mass >= least_mass_share * total;
     entry[i].open = !fixed && !entry[i].rigid && (merges(entry[i].law.law) || (filled && heavy_enough));
   }
-  set_normals(node, patch, settings.options.normal_choice);
+  set_normals(node, patch, lattice, settings.options.normal_choice);
   set_gates(node, patch, lattice, settings, bodies);
 }
 
 template <int Dim>
-void ContactSweep<Dim>::set_normals(const SharedNode& node, const Patch<Dim>& patch, NormalChoice choice) {
+void ContactSweep<Dim>::set_normals(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                    NormalChoice choice) {
   ContactEntry<Dim>* entry = &entries_[node.first];
   const auto gradient = [&](const ContactEntry<Dim>& e) -> Vec<Dim> {
     return ConstNode<Dim>(sums_at(patch.pieces[e.piece], e.node) + NodeSums<Dim>::gradient);
   };
-  const Vec<Dim> of_partner = gradient(entry[node.partner]);
+  const auto flatness = [&](const ContactEntry<Dim>& e, const Vec<Dim>& g) {
+    const double volume = sums_at(patch.pieces[e.piece], e.node)[NodeSums<Dim>::volume] / lattice.cell_volume();
+    const double flat = std::sqrt(2 * std::clamp(std::min(volume, 1 - volume), 0.0, 0.5));
+    const double size = g.cwiseProduct(lattice.spacing()).norm() / lattice.cell_volume();
+    return size < 0.1 ? size : size / (flat + 0.02);
+  };
+  const auto& partner = entry[node.partner];
+  const Vec<Dim> of_partner = gradient(partner);
+  const double partner_flatness = flatness(partner, of_partner);
   for (int i = 0; i < node.count; ++i) {
     Vec<Dim> g = gradient(entry[i]);
-    // The larger of the two gradients is the more exact one: a flat face's beside a corner's.
-    if (choice == NormalChoice::common && of_partner.squaredNorm() > g.squaredNorm()) g = -of_partner;
+    if (choice == NormalChoice::common && partner_flatness > flatness(entry[i], g)) g = -of_partner;
     const double size = g.norm();
     if (size > 0) entry[i].normal = g / size;
     else if (!merges(entry[i].law.law)) entry[i].open = false;

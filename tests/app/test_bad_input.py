@@ -6,11 +6,10 @@ Usage: python test_bad_input.py CAIRN_EXE SCRATCH_DIR
 import concurrent.futures
 import dataclasses
 import os
-import pathlib
-import shutil
-import subprocess
 import sys
 import time
+
+from harness import Program, fresh_folder
 
 BASE = """\
 title = "two disks"
@@ -120,62 +119,87 @@ def usage(name, args, *words):
 CASES = [
     case("unknown_key", "cells = ", "cels = ", "cels", "domain.cels", "unknown key", "'cells'"),
     case("unknown_table", "[solver]", "[slover]", "[slover]", "slover", "unknown key", "'solver'"),
-    case("unknown_material_key", "bulk_modulus", "bulk_modulos", "bulk_modulos", "materials.soft.bulk_modulos", "'bulk_modulus'"),
+    case("unknown_material_key", "bulk_modulus", "bulk_modulos", "bulk_modulos", "materials.soft.bulk_modulos",
+         "'bulk_modulus'"),
     case("wrong_type", "end = 0.1", 'end = "soon"', "soon", "time.end", "is a string", "greater than 0"),
     case("number_for_text", 'title = "two disks"', "title = 2", "title", "title", "must be a string"),
     case("table_for_number", "cfl = 0.4", "cfl = { a = 1 }", "cfl", "time.cfl", "is a table"),
-    case("negative_density", "density = 1000.0", "density = -1.0", "density", "materials.soft.density", "-1", "greater than 0"),
+    case("negative_density", "density = 1000.0", "density = -1.0", "density", "materials.soft.density", "-1",
+         "greater than 0"),
     case("missing_density", "density = 1000.0\n", "", "[materials.soft]", "materials.soft.density", "missing"),
     case("zero_cells", "cells = [20, 20]", "cells = [0, 20]", "cells =", "domain.cells", "in [1, 1000000]"),
     case("fractional_cells", "cells = [20, 20]", "cells = [20.5, 20]", "cells =", "domain.cells", "whole number"),
-    case("cell_size_no_divisor", "cells = [20, 20]", "cell_size = 0.03", "cell_size", "domain.cell_size", "whole cells"),
-    case("cells_and_size", "cells = [20, 20]", "cells = [20, 20]\ncell_size = 0.05", "cell_size", "domain.cell_size", "one of the two"),
+    case("cell_size_no_divisor", "cells = [20, 20]", "cell_size = 0.03", "cell_size", "domain.cell_size",
+         "whole cells"),
+    case("cells_and_size", "cells = [20, 20]", "cells = [20, 20]\ncell_size = 0.05", "cell_size", "domain.cell_size",
+         "one of the two"),
     case("upper_below_lower", "upper = [1.0, 1.0]", "upper = [1.0, -1.0]", "upper", "domain.upper", "greater"),
     case("dimension_4", "dimension = 2", "dimension = 4", "dimension", "domain.dimension", "in [2, 3]"),
     Bad("missing_table", ["case.toml:1: domain: ", "missing"],
         {"case.toml": BASE[: BASE.index("[domain]")] + BASE[BASE.index("[time]"):]}),
     case("no_end", "end = 0.1\n", "", "[time]", "time.end", "missing", "steps"),
-    case("body_outside", "centre = [0.3, 0.5]", "centre = [-3.0, 0.5]", "centre = [-3", "bodies.0.shape", "outside the domain"),
-    case("body_beyond_corner", "centre = [0.3, 0.5]", "centre = [-0.14, -0.14]", "centre = [-0.14", "bodies.0.shape", "corner"),
-    case("nan", "radius = 0.15 }\nmaterial = \"soft\"\nvelocity", "radius = nan }\nmaterial = \"soft\"\nvelocity", "nan",
+    case("body_outside", "centre = [0.3, 0.5]", "centre = [-3.0, 0.5]", "centre = [-3", "bodies.0.shape",
+         "outside the domain"),
+    case("body_beyond_corner", "centre = [0.3, 0.5]", "centre = [-0.14, -0.14]", "centre = [-0.14", "bodies.0.shape",
+         "corner"),
+    case("nan", "radius = 0.15 }\nmaterial = \"soft\"\nvelocity", "radius = nan }\nmaterial = \"soft\"\nvelocity",
+         "nan",
          "bodies.0.shape.radius", "greater than 0"),
     case("infinity", "velocity = [1.0, 0.0]", "velocity = [inf, 0.0]", "inf,", "bodies.0.velocity", "finite"),
-    case("unknown_material", 'material = "soft"\ngroup', 'material = "sfot"\ngroup', "sfot", "bodies.1.material", "known are soft"),
-    case("unknown_model", '"neo_hookean"', '"neo_hokean"', "neo_hokean", "materials.soft.model", "choose one of", "neo_hookean", "von_mises"),
-    case("one_modulus_only", "bulk_modulus = 2.0e5\n", "", "[materials.soft]", "materials.soft.bulk_modulus", "missing"),
-    case("both_modulus_pairs", "bulk_modulus = 2.0e5", "bulk_modulus = 2.0e5\nyoungs_modulus = 1.0e5\npoissons_ratio = 0.3",
+    case("unknown_material", 'material = "soft"\ngroup', 'material = "sfot"\ngroup', "sfot", "bodies.1.material",
+         "known are soft"),
+    case("unknown_model", '"neo_hookean"', '"neo_hokean"', "neo_hokean", "materials.soft.model", "choose one of",
+         "neo_hookean", "von_mises"),
+    case("one_modulus_only", "bulk_modulus = 2.0e5\n", "", "[materials.soft]", "materials.soft.bulk_modulus",
+         "missing"),
+    case("both_modulus_pairs", "bulk_modulus = 2.0e5",
+         "bulk_modulus = 2.0e5\nyoungs_modulus = 1.0e5\npoissons_ratio = 0.3",
          "youngs_modulus", "materials.soft.youngs_modulus", "one pair"),
-    case("poissons_ratio", "shear_modulus = 1.0e5\nbulk_modulus = 2.0e5", "youngs_modulus = 1.0e5\npoissons_ratio = 0.5",
+    case("poissons_ratio", "shear_modulus = 1.0e5\nbulk_modulus = 2.0e5",
+         "youngs_modulus = 1.0e5\npoissons_ratio = 0.5",
          "poissons_ratio", "materials.soft.poissons_ratio", "(-1, 0.5)"),
-    case("vector_length", "velocity = [1.0, 0.0]", "velocity = [1.0, 0.0, 0.0]", "velocity", "bodies.0.velocity", "3 entries", "2 numbers"),
-    case("periodic_face", "periodic = [false, false]", "periodic = [true, false]", "left =", "boundary.left", "periodic"),
-    case("periodic_too_few_cells", "cells = [20, 20]\nperiodic = [false, false]", "cells = [20, 3]\nperiodic = [false, true]",
+    case("vector_length", "velocity = [1.0, 0.0]", "velocity = [1.0, 0.0, 0.0]", "velocity", "bodies.0.velocity",
+         "3 entries", "2 numbers"),
+    case("periodic_face", "periodic = [false, false]", "periodic = [true, false]", "left =", "boundary.left",
+         "periodic"),
+    case("periodic_too_few_cells", "cells = [20, 20]\nperiodic = [false, false]",
+         "cells = [20, 3]\nperiodic = [false, true]",
          "periodic", "domain.periodic", "at least 4"),
-    case("points_per_cell", "points_per_cell = 4", "points_per_cell = 5", "points_per_cell", "solver.points_per_cell", "square", "4, 9, 16"),
+    case("points_per_cell", "points_per_cell = 4", "points_per_cell = 5", "points_per_cell", "solver.points_per_cell",
+         "square", "4, 9, 16"),
     case("unknown_choice", '"gimp"', '"cubic"', "cubic", "solver.shape", "linear, gimp, bspline2"),
     case("negative_friction", "friction = 0.3", "friction = -0.3", "friction", "contact.friction", "at least 0"),
-    case("unknown_shape", '"disk", centre = [0.3', '"dsik", centre = [0.3', "dsik", "bodies.0.shape.type", "choose one of", "polygon"),
+    case("unknown_shape", '"disk", centre = [0.3', '"dsik", centre = [0.3', "dsik", "bodies.0.shape.type",
+         "choose one of", "polygon"),
     case("sphere_in_2d", '"disk", centre = [0.3', '"sphere", centre = [0.3', "sphere", "bodies.0.shape.type", "disk"),
     case("face_of_3d", "left = ", "back = ", "back", "boundary.back", "3D"),
     case("face_type", '"wall" }', '"wal" }', "wal", "boundary.left.type", "free, fixed, symmetry, wall"),
-    case("face_velocity", '"wall" }', '"free", velocity = [0.0, 0.0] }', "free", "boundary.left.velocity", "fixed or wall"),
+    case("face_velocity", '"wall" }', '"free", velocity = [0.0, 0.0] }', "free", "boundary.left.velocity",
+         "fixed or wall"),
     case("schedule_zero", "every = 1", "every = 0", "every", "output.history.every", "at least 1"),
     Bad("duplicate_key", ["case.toml:10: ", "TOML", "end"], {"case.toml": changed("cfl = 0.4", "end = 0.2")}),
     Bad("syntax", ["case.toml:9: ", "TOML"], {"case.toml": changed("end = 0.1", "end = ")}),
-    Bad("all_at_once", ["case.toml:6: domain.cells", "case.toml:10: time.cfl", "case.toml:18: materials.soft.density", "3 errors"],
+    Bad("all_at_once",
+        ["case.toml:6: domain.cells", "case.toml:10: time.cfl", "case.toml:18: materials.soft.density", "3 errors"],
         {"case.toml": BASE.replace("[20, 20]", "20.5").replace("cfl = 0.4", "cfl = 2").replace("1000.0", "0.0")}),
-    added("unknown_field", 'particles = { every = 1, fields = ["temperature"] }\n', "temperature", "output.particles.fields",
+    added("unknown_field", 'particles = { every = 1, fields = ["temperature"] }\n', "temperature",
+          "output.particles.fields",
           "choose from velocity"),
     added("track_range", "track = [2]\n", "track", "output.track", "body 2 does not exist", "0 to 1"),
     added("drive_range", "[[drive]]\nids = [7]\n", "ids", "drive.0.ids", "body 7 does not exist"),
     added("drive_group", '[[drive]]\nbodies = { group = "rihgt" }\n', "rihgt", "drive.0.bodies.group", "no body"),
     added("drive_nothing", "[[drive]]\nvelocity = [0.0, 1.0]\n", "[[drive]]", "drive.0.bodies", "give one of"),
-    added("drive_face", '[[drive]]\nbodies = { overlapping = "left" }\n', "overlapping", "drive.0.bodies.overlapping", "no body reaches"),
-    added("pair_material", '[[contact.pair]]\nmaterials = ["soft", "hard"]\n', "hard", "contact.pair.0.materials", "known are soft, wall"),
+    added("drive_face", '[[drive]]\nbodies = { overlapping = "left" }\n', "overlapping", "drive.0.bodies.overlapping",
+          "no body reaches"),
+    added("pair_material", '[[contact.pair]]\nmaterials = ["soft", "hard"]\n', "hard", "contact.pair.0.materials",
+          "known are soft, wall"),
+    added("unknown_partition", '[parallel]\npartition = "metsi"\n', "metsi", "parallel.partition",
+          "metis, round_robin"),
     added("grain_table_missing", GRAINS, "pack.csv", "grains.0.file", "there is no file"),
     Bad("no_bodies", ["case.toml:1: bodies: ", "no body"],
         {"case.toml": BASE[: BASE.index("[[bodies]]")] + BASE[BASE.index("[boundary]"):]}),
-    Bad("grain_table_is_folder", ["pack.csv", "is a folder"], {"case.toml": BASE + GRAINS}, prepare=lambda d: (d / "pack.csv").mkdir()),
+    Bad("grain_table_is_folder", ["pack.csv", "is a folder"], {"case.toml": BASE + GRAINS},
+        prepare=lambda d: (d / "pack.csv").mkdir()),
     table("grain_header", "x,y,radius\n0.5,0.9,0.05\n", 1, '"radius"', "'r'", "x,y,r"),
     table("grain_no_column", "# grains\nx,r\n0.5,0.05\n", 2, "y: ", "missing"),
     table("grain_number", "x,y,r\n0.5,0.9,0.05\n0.2,O.9,0.05\n", 3, "y: ", "O.9", "not a number"),
@@ -189,13 +213,15 @@ CASES = [
     table("grain_huge_line", "x,y,r\n" + "9" * 1_000_000 + "\n", 2, "has 1 values"),
     Bad("grain_many_errors", ["pack.csv:2: r: ", "pack.csv:21: r: ", "... and 30 more"],
         {"case.toml": BASE + GRAINS, "pack.csv": "x,y,r\n" + "0.5,0.9,-1\n" * 50}),
-    Bad("grain_table_junk", ["pack.csv", "not a text file"], {"case.toml": BASE + GRAINS, "pack.csv": bytes(range(256)) * 8}),
+    Bad("grain_table_junk", ["pack.csv", "not a text file"],
+        {"case.toml": BASE + GRAINS, "pack.csv": bytes(range(256)) * 8}),
     Bad("empty_file", ["case.toml:1: ", "empty"], {"case.toml": ""}),
     Bad("binary_junk", ["case.toml", "not a text file"], {"case.toml": bytes(range(256)) * 100}),
     Bad("text_junk", ["case.toml:1: ", "TOML"], {"case.toml": b"\x89PNG\r\n\x1a\n\xff\xfe\xfd" * 10}),
     Bad("file_is_folder", ["case.toml", "is a folder"], {}, prepare=lambda d: (d / "case.toml").mkdir()),
     Bad("file_missing", ["case.toml", "no such file"], {}),
-    Bad("unreadable_file", ["case.toml", "cannot be read"], {"case.toml": BASE}, prepare=lambda d: (d / "case.toml").chmod(0)),
+    Bad("unreadable_file", ["case.toml", "cannot be read"], {"case.toml": BASE},
+        prepare=lambda d: (d / "case.toml").chmod(0)),
     override("set_unknown_key", "contact.frictoin", "0.5", "unknown key", "'friction'"),
     override("set_range", "time.end", "-1", "greater than 0"),
     override("set_not_toml", "contact.law", "stick", "quotes"),
@@ -209,12 +235,17 @@ CASES = [
     usage("no_case", ["run", "--out", "out"], "CASE.toml", "required"),
     usage("out_is_file", ["run", "case.toml", "--out", "case.toml"], "--out", "case.toml", "not a folder"),
     usage("out_below_file", ["run", "case.toml", "--out", "case.toml/out"], "--out", "cannot be made"),
-    usage("out_unwritable", ["run", "case.toml", "--out", "/proc/cairn/out"], "--out", "/proc/cairn/out", "cannot be made"),
+    usage("out_unwritable", ["run", "case.toml", "--out", "/proc/cairn/out"], "--out", "/proc/cairn/out",
+          "cannot be made"),
+    usage("overwrite_restart", ["run", "case.toml", "--out", "out", "--overwrite", "--restart", "latest"],
+          "--overwrite", "--restart"),
+    usage("check_set_no_value", ["check", "case.toml", "--set", "time.steps"], "--set time.steps", "KEY=VALUE"),
     usage("restart_missing", ["run", "case.toml", "--out", "out", "--restart", "nowhere.h5"], "nowhere.h5"),
     usage("info_missing", ["info", "nothing.h5"], "nothing.h5"),
     usage("info_not_hdf5", ["info", "case.toml"], "case.toml"),
     usage("pack_no_output", ["pack", "case.toml"], "-o"),
-    Bad("pack_folder", ["-o: nowhere/made.csv", "folder"], {"spec.toml": PACK}, ["pack", "spec.toml", "-o", "nowhere/made.csv"]),
+    Bad("pack_folder", ["-o: nowhere/made.csv", "folder"], {"spec.toml": PACK},
+        ["pack", "spec.toml", "-o", "nowhere/made.csv"]),
     pack("pack_unknown_key", "count", "cuont", "cuont", "pack.cuont", "'count'"),
     pack("pack_choice", '"uniform"', '"unform"', "unform", "sizes.type", "uniform, lognormal, list, fit"),
     pack("pack_negative", "min = 0.05", "min = -0.05", "min =", "sizes.min", "greater than 0"),
@@ -222,12 +253,15 @@ CASES = [
     pack("pack_too_full", "count = 20", "count = 20000", None, "pack.count"),
 ]
 
-NOISE = ("-----", "Primary job", "a non-zero", "mpirun detected", "the job to be", "Process name", "Exit code", "Per user-direction")
+def fixed_left(rows, more=""):
+    """Files of a case with disks beside a fixed left face; cells are 0.05 wide."""
+    text = BASE.replace('left = { type = "wall" }', 'left = { type = "fixed" }').replace("[0.3, 0.5]", "[0.45, 0.5]")
+    return {"case.toml": text.replace("[0.7, 0.5]", "[0.8, 0.5]") + GRAINS + more, "pack.csv": "x,y,r\n" + rows}
 
 
 @dataclasses.dataclass
 class Warning_:
-    """Input that is right but doubtful."""
+    """Input that is right but doubtful; with nothing to expect, not even that."""
 
     name: str
     expect: list
@@ -242,6 +276,12 @@ WARNINGS = [
               .replace("[0.3, 0.5]", "[0.1, 0.5]").replace("[0.7, 0.5]", "[0.9, 0.5]")}),
     Warning_("thin_grain", ["warning: ", "pack.csv:3", "2 of 5 bodies", "thinner than 2 cells"],
              {"case.toml": BASE + GRAINS, "pack.csv": "x,y,r\n0.5,0.8,0.1\n0.1,0.1,0.03\n0.9,0.1,0.04\n"}),
+    Warning_("near_fixed_face",
+             ["warning: pack.csv:2: body 2 lies 0.4 cells from the fixed face left", "2 of 5 bodies"],
+             fixed_left("0.12,0.8,0.1\n0.8,0.87,0.1\n0.149,0.2,0.1\n")),
+    Warning_("on_or_far_from_fixed_face", [], fixed_left("0.1,0.8,0.1\n0.09,0.2,0.1\n0.151,0.5,0.1\n")),
+    Warning_("driven_near_fixed_face", [],
+             fixed_left("0.12,0.8,0.1\n", '[[drive]]\nids = [2]\nvelocity = [0.0, 1.0]\n')),
 ]
 
 
@@ -251,17 +291,7 @@ def write(folder, files):
         (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
-def execute(command, folder):
-    """Runs in the folder; returns exit code, standard output, and standard error without mpirun's own words."""
-    try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, timeout=60, check=False)
-    except subprocess.TimeoutExpired:
-        return "hang", "", ""
-    lines = done.stderr.decode(errors="replace").splitlines()
-    return done.returncode, done.stdout.decode(errors="replace"), "\n".join(x for x in lines if x.strip() and not x.strip().startswith(NOISE))
-
-
-def check_bad(bad, scratch, exe, mpirun):
+def check_bad(bad, scratch, cairn):
     """Problems found with one wrong input."""
     folder = scratch / bad.name
     write(folder, bad.files)
@@ -269,11 +299,12 @@ def check_bad(bad, scratch, exe, mpirun):
         bad.prepare(folder)
     before = sorted(p.name for p in folder.iterdir())
     problems, reports = [], []
-    for ranks, launcher in (1, []), (2, [mpirun, "--oversubscribe", "-n", "2"]):
-        code, _, report = execute(launcher + [exe, *bad.args], folder)
+    for ranks in (1, 2):
+        done = cairn(*bad.args, ranks=ranks, cwd=folder, timeout=60)
+        report = done.err
         reports.append(report)
-        if code != 2:
-            problems.append(f"{ranks} ranks: exit code {code} instead of 2")
+        if done.code != 2:
+            problems.append(f"{ranks} ranks: exit code {done.code} instead of 2")
         problems += [f"{ranks} ranks: '{text}' is not in the report" for text in bad.expect if text not in report]
         if not report:
             problems.append(f"{ranks} ranks: no report")
@@ -284,46 +315,39 @@ def check_bad(bad, scratch, exe, mpirun):
         problems.append("the reports of 1 and 2 ranks differ:\n" + reports[1])
     if sorted(p.name for p in folder.iterdir()) != before:
         problems.append("something was created")
-    if bad.args[:2] == ["run", "case.toml"] and not any(a == "--set" for a in bad.args) and bad.expect and bad.expect[0][:4] == "case":
-        code, _, report = execute([exe, "check", "case.toml"], folder)
-        if code != 2 or report != reports[0]:
-            problems.append(f"check: exit code {code}, or another report than run:\n{report}")
+    if bad.args[:2] == ["run", "case.toml"] and bad.expect and bad.expect[0].startswith(("case", "--set ")):
+        done = cairn("check", "case.toml", *bad.args[4:], cwd=folder, timeout=60)  # without --out and its folder
+        if done.code != 2 or done.err != reports[0]:
+            problems.append(f"check: exit code {done.code}, or another report than run:\n{done.err}")
     return [f"{bad.name}: {p}" for p in problems] + ([f"--- {bad.name} ---\n{reports[0]}"] if problems else [])
 
 
-def check_warning(warning, scratch, exe):
+def check_warning(warning, scratch, cairn):
     folder = scratch / warning.name
     write(folder, warning.files)
     before = sorted(p.name for p in folder.iterdir())
-    code, out, report = execute([exe, "check", "case.toml"], folder)
-    problems = [f"'{text}' is not in the report" for text in warning.expect if text not in report]
-    if code != 0 or "case.toml: ok" not in out:
-        problems.append(f"exit code {code} instead of 0")
+    done = cairn("check", "case.toml", cwd=folder, timeout=60)
+    problems = [f"'{text}' is not in the report" for text in warning.expect if text not in done.err]
+    if not warning.expect and done.err:
+        problems.append("a warning without need")
+    if done.code != 0 or "case.toml: ok" not in done.out:
+        problems.append(f"exit code {done.code} instead of 0")
     if sorted(p.name for p in folder.iterdir()) != before:
         problems.append("check created something")
-    return [f"{warning.name}: {p}\n{report}" for p in problems]
+    return [f"{warning.name}: {p}\n{done.err}" for p in problems]
 
 
 def main():
-    exe, scratch = str(pathlib.Path(sys.argv[1]).resolve()), pathlib.Path(sys.argv[2]).resolve()
-    mpirun = os.environ.get("CAIRN_MPIRUN") or shutil.which("mpirun")
-    if not mpirun:
-        print("mpirun was not found")
-        return 77
-    for key, value in (("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"), ("OMPI_MCA_mpi_yield_when_idle", "1")):
-        os.environ.setdefault(key, value)
-    scratch.mkdir(parents=True, exist_ok=True)
+    cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
     names = [c.name for c in CASES] + [w.name for w in WARNINGS]
     assert len(set(names)) == len(names), "names must differ"
-    for name in names:
-        shutil.rmtree(scratch / name, ignore_errors=True)
     root = os.geteuid() == 0  # root reads every file
     cases = [c for c in CASES if not (root and c.name == "unreadable_file")]
     start = time.monotonic()
     # Most of a run's time is mpirun's waiting, not computing.
     with concurrent.futures.ThreadPoolExecutor(8) as pool:
-        results = list(pool.map(lambda c: check_bad(c, scratch, exe, mpirun), cases))
-        results += list(pool.map(lambda w: check_warning(w, scratch, exe), WARNINGS))
+        results = list(pool.map(lambda c: check_bad(c, scratch, cairn), cases))
+        results += list(pool.map(lambda w: check_warning(w, scratch, cairn), WARNINGS))
     failures = [line for result in results for line in result]
     print("\n".join(failures))
     print(f"{len(results)} inputs, {sum(map(bool, results))} failed, {time.monotonic() - start:.0f} s")

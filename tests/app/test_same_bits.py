@@ -118,7 +118,8 @@ def check_content(name: str, folder: Path, settings: dict) -> list[str]:
     """A comparison says something only if the run holds migration, contact and motion."""
     problems = []
     particles = sorted(folder.glob("particles_*.vtkhdf"))
-    start, end = (patches_of_points(folder, file, settings["domain.patch_cells"]) for file in (particles[0], particles[-1]))
+    cells = settings["domain.patch_cells"]
+    start, end = (patches_of_points(folder, file, cells) for file in (particles[0], particles[-1]))
     crossed = sum(start[point] != end[point] for point in start)
     if sorted(start) != sorted(end) or len(set(start)) != len(start):
         problems.append("points were lost, or ids are not unique")

@@ -79,18 +79,19 @@ void check_sets() {
     for (const auto& i : in_a)
       if (in_b.count(i) > 0) both.insert(i);
     EXPECT_EQ(as_set(intersection(a, b)), both);
-    if (!in_b.empty()) EXPECT_EQ(a.contains(b), both == in_b);
+    if (!in_b.empty()) {
+      EXPECT_EQ(a.contains(b), both == in_b);
+    }
 
     const auto whole = hull(a, b);
     for (const auto& i : in_a) EXPECT_TRUE(whole.contains(i));
     for (const auto& i : in_b) EXPECT_TRUE(whole.contains(i));
-    if (a.empty()) EXPECT_EQ(whole, b);
-    else if (b.empty()) EXPECT_EQ(whole, a);
-    else
-      for (int d = 0; d < Dim; ++d) {
-        EXPECT_EQ(whole.lower[d], std::min(a.lower[d], b.lower[d]));
-        EXPECT_EQ(whole.upper[d], std::max(a.upper[d], b.upper[d]));
-      }
+    Box<Dim> expected = a.empty() ? b : a;
+    for (int d = 0; d < Dim && !a.empty() && !b.empty(); ++d) {
+      expected.lower[d] = std::min(a.lower[d], b.lower[d]);
+      expected.upper[d] = std::max(a.upper[d], b.upper[d]);
+    }
+    EXPECT_EQ(whole, expected);
   }
 }
 TEST(Box, IntersectionAndHullAreThoseOfSets) {

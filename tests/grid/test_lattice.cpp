@@ -123,7 +123,8 @@ using Contribution = std::pair<int, Index<Dim>>;  // patch, position of the node
 
 /// Who adds to a node, in the order in which a patch adds, as `Patch` prescribes it.
 template <int Dim>
-std::vector<Contribution<Dim>> order_of_sums(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const Index<Dim>& i) {
+std::vector<Contribution<Dim>> order_of_sums(const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                             const std::type_identity_t<Index<Dim>>& i) {
   std::vector<Contribution<Dim>> order;
   for (std::size_t l = 0; l <= patch.links.size(); ++l) {
     if (static_cast<int>(l) == patch.links_before) order.emplace_back(patch.id, i);

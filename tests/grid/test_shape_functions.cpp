@@ -74,7 +74,9 @@ void check_formula(const Shape& shape, Formula&& formula, double tolerance = rou
       const Weight w = at == found.end() ? Weight{0, 0} : at->second;
       EXPECT_NEAR(w.value, expected.value, tolerance) << xi - node;
       // On a node the hat has no slope; either side's will do there.
-      if (xi != std::floor(xi)) EXPECT_NEAR(w.slope, expected.slope, tolerance) << xi - node;
+      if (xi != std::floor(xi)) {
+        EXPECT_NEAR(w.slope, expected.slope, tolerance) << xi - node;
+      }
     }
   }
 }
@@ -130,7 +132,9 @@ TEST(ShapeFunctions, GimpTendsToLinear) {
     for (const auto& [node, w] : weights(LinearShape{}, xi)) {
       if (fine.count(node) == 0) continue;  // the far node of a point close to another: its weight is tiny
       EXPECT_NEAR(fine.at(node).value, w.value, l + 1e-7);
-      if (std::abs(xi - std::round(xi)) > l) EXPECT_NEAR(fine.at(node).slope, w.slope, 1e-7);
+      if (std::abs(xi - std::round(xi)) > l) {
+        EXPECT_NEAR(fine.at(node).slope, w.slope, 1e-7);
+      }
     }
   }
 }

@@ -169,14 +169,15 @@ void check_rigid_rotation(const ConcreteLaw& law) {
   const Vec3 axis = Dim == 2 ? Vec3(Vec3::UnitZ()) : Vec3(Vec3(1, 2, -0.5).normalized());
   Mat3 cross;
   cross << 0, -axis.z(), axis.y(), axis.z(), 0, -axis.x(), -axis.y(), axis.x(), 0;
-  const double work = point.state[std::is_same_v<ConcreteLaw, VonMises> ? 1 : 0];
+  constexpr int work_at = std::is_same_v<ConcreteLaw, VonMises> ? 1 : 0;
+  const double work = point.state[work_at];
   for (int i = 0; i < steps; ++i) point.advance(w * cross);
   EXPECT_NEAR(point.stress.trace(), start.trace(), 1e-12 * start.norm());
   EXPECT_NEAR(point.stress.norm(), start.norm(), 1e-12 * start.norm());
   EXPECT_NEAR(point.stress.determinant(), start.determinant(), 1e-12 * std::pow(start.norm(), 3));
   const Mat3 R = Eigen::AngleAxisd(steps * 2 * std::atan(w / 2), axis).toRotationMatrix();
   EXPECT_LE((point.stress - R * start * R.transpose()).norm(), 1e-11 * start.norm());
-  EXPECT_NEAR(point.state[std::is_same_v<ConcreteLaw, VonMises> ? 1 : 0], work, 1e-12 * work);
+  EXPECT_NEAR(point.state[work_at], work, 1e-12 * work);
 }
 TEST(Laws, RigidRotationKeepsTheStress) {
   check_rigid_rotation<2>(Hypoelastic(values));

@@ -2,6 +2,7 @@
 /// Lattices of several shapes for property tests: every choice of periodic directions, patches that do not divide the
 /// cells evenly, periodic directions one and two patches wide.
 
+#include <type_traits>
 #include <vector>
 
 #include "cairn/grid/lattice.hpp"
@@ -33,7 +34,7 @@ std::vector<Lattice<Dim>> all_lattices() {
 
 /// The node inside one period that `node` is an image of.
 template <int Dim>
-Index<Dim> canonical(const Lattice<Dim>& lattice, Index<Dim> node) {
+Index<Dim> canonical(const Lattice<Dim>& lattice, std::type_identity_t<Index<Dim>> node) {
   for (int d = 0; d < Dim; ++d)
     if (lattice.periodic(d)) node[d] = ((node[d] % lattice.cells()[d]) + lattice.cells()[d]) % lattice.cells()[d];
   return node;

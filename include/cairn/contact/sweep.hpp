@@ -82,7 +82,7 @@ class ContactSweep {
                     const std::vector<Body>& bodies);
   void prepare(SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
-  void set_normals(const SharedNode& node, const Patch<Dim>& patch, NormalChoice choice);
+  void set_normals(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice, NormalChoice choice);
   void set_gates(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                  const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
   Vec<Dim> impulse(ContactEntry<Dim>& entry, const Vec<Dim>& P, const Vec<Dim>& F, const ContactSettings<Dim>& settings,

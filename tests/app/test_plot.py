@@ -1,0 +1,182 @@
+"""scripts/plot draws every picture of a run, and measures the shear band rightly.
+
+    test_plot.py CAIRN SCRATCH
+"""
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from harness import ROOT, SKIP, Program, fresh_folder, sets
+
+for package in ("numpy", "h5py", "matplotlib"):
+    if importlib.util.find_spec(package) is None:
+        print(f"Python lacks {package}")
+        sys.exit(SKIP)
+
+import h5py  # noqa: E402  after the check that they are there
+import matplotlib.image  # noqa: E402
+import numpy as np  # noqa: E402
+
+WIDTH = 1.2e-3  # of the layer [m]
+CELLS = 120
+GRAINS = 12  # along a side; disks on a square lattice, so that their mean diameter is known
+RADIUS = 0.45 * WIDTH / GRAINS
+SPEED = 100.0  # of the right side [m/s]
+FRAMES = 41  # at every 2 % of shear
+
+CASE = f"""\
+title = "{{title}}"
+[domain]
+dimension = 2
+lower = [0.0, 0.0]
+upper = [{WIDTH}, {WIDTH}]
+cells = [{CELLS}, {CELLS}]
+periodic = [false, true]
+gravity = [0.0, 0.0]
+[solver]
+points_per_cell = 4
+[boundary]
+left = {{{{ type = "fixed", velocity = [0.0, 0.0] }}}}
+right = {{{{ type = "fixed", velocity = [0.0, {SPEED}] }}}}
+"""
+COLUMNS = ("step", "time", "dt", "kinetic_energy", "strain_energy", "potential_energy", "plastic_dissipation",
+           "contact_dissipation", "boundary_work", "energy_error", "momentum_x", "momentum_y", "contact_nodes")
+
+
+def profile(x: np.ndarray, band: tuple[float, float]) -> np.ndarray:
+    """Share of the right side's displacement at x: all of it is gained across the band."""
+    return np.clip((x - band[0]) / (band[1] - band[0]), 0, 1)
+
+
+def disks() -> tuple[np.ndarray, np.ndarray]:
+    """Positions [m] and bodies of the points of all disks."""
+    side = (np.arange(2 * CELLS) + 0.5) * WIDTH / (2 * CELLS)
+    x = np.stack(np.meshgrid(side, side, indexing="ij"), -1).reshape(-1, 2)
+    place = np.floor(x / WIDTH * GRAINS)
+    inside = np.linalg.norm(x - (place + 0.5) * WIDTH / GRAINS, axis=1) < RADIUS
+    return x[inside], (place[inside] @ (GRAINS, 1)).astype(np.int32)
+
+
+def write_run(folder: Path, title: str, band: tuple[float, float], plastic: float):
+    """A made-up run in the layout of a real one; the points' order differs from frame to frame."""
+    folder.mkdir()
+    (folder / "case.toml").write_text(CASE.format(title=title))
+    x, body = disks()
+    random = np.random.default_rng(2)
+    for frame in range(FRAMES):
+        time = frame * 0.02 * WIDTH / SPEED
+        y = x[:, 1] + SPEED * time * profile(x[:, 0], band)
+        order = random.permutation(len(x))
+        fields = {"velocity": np.column_stack([0 * y, SPEED * profile(x[:, 0], band), 0 * y]),
+                  "stress": random.uniform(0, 1e8, (len(x), 6)), "body": body, "id": np.arange(len(x)),
+                  "volume": np.full(len(x), (WIDTH / CELLS) ** 2 / 4), "mass": np.ones(len(x)),
+                  "image": np.column_stack([0 * body, np.floor(y / WIDTH).astype(np.int32), 0 * body])}
+        with h5py.File(folder / f"particles_{frame:06d}.vtkhdf", "w") as file:
+            group = file.create_group("VTKHDF")
+            group.attrs["time"], group.attrs["step"] = time, frame
+            group["Points"] = np.column_stack([x[:, 0], y % WIDTH, 0 * y])[order]
+            for name, values in fields.items():
+                group[f"PointData/{name}"] = values[order]
+    rows = [",".join(COLUMNS)]
+    for i in range(0, 101, 10):
+        values = dict.fromkeys(COLUMNS, 0) | {"step": i, "time": i / 100 * time, "kinetic_energy": i,
+                                              "boundary_work": i, "plastic_dissipation": plastic * i,
+                                              "energy_error": 1e-4 * i}
+        rows.append(",".join(map(str, values.values())))
+    (folder / "history.csv").write_text("\n".join(rows) + "\n")
+
+
+def plot(*arguments) -> str:
+    command = [ROOT / "scripts" / "plot", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+def check_picture(file: Path):
+    """A PNG of some size that shows something."""
+    assert file.is_file(), f"{file} was not drawn"
+    assert file.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n", f"{file} is no PNG"
+    pixels = matplotlib.image.imread(file)[:, :, :3]
+    assert min(pixels.shape[:2]) > 300, f"{file} has {pixels.shape} pixels"
+    colours = len(np.unique((pixels * 255).astype(np.uint8).reshape(-1, 3), axis=0))
+    assert colours > 20 and pixels.std() > 0.05, f"{file} is nearly empty: {colours} colours"
+
+
+def check_bands(summary: dict, band: tuple[float, float]):
+    """A share of the displacement lies within the same share of the band; exact to two columns of cells."""
+    size = WIDTH / CELLS
+    expected = {(shear, share) for shear in (0.26, 0.50, 0.74, 0.76, 0.24) for share in (0.75, 0.90)}
+    entries = summary["shear_band"]
+    assert len(entries) == 6, f"{len(entries)} bands instead of 2 for each of 3 shears"
+    for entry in entries:
+        assert (round(entry["shear"], 6), entry["share"]) in expected, entry
+        width = entry["share"] * (band[1] - band[0])
+        assert abs(entry["width_mm"] * 1e-3 - width) <= 2 * size, f"{entry}: expected {width} m"
+        assert abs(entry["width_share_of_layer"] - width / WIDTH) <= 2 / CELLS, entry
+        assert band[0] - size <= entry["from_mm"] * 1e-3 < entry["to_mm"] * 1e-3 <= band[1] + size, f"{entry}: outside"
+        diameters = entry["width_mm"] / summary["mean_grain_diameter_mm"]
+        assert abs(entry["width_diameters"] - diameters) < 1e-9, entry
+
+
+def synthetic(scratch: Path):
+    """A shear band whose width is known beside a uniform shear."""
+    band = (0.5 * WIDTH, 0.75 * WIDTH)
+    write_run(scratch / "banded", "Banded", band, 1.0)
+    write_run(scratch / "uniform", "Uniform", (0.0, WIDTH), 5.0)
+    plot(scratch / "uniform")
+    plot(scratch / "banded", "--compare", scratch / "uniform")
+    summaries = {}
+    for name in ("banded", "uniform"):
+        pictures = scratch / name / "pictures"
+        for file in ("grains_start", "grains_75", "grains_end", "principal_stress", "displacement_profile", "energy"):
+            check_picture(pictures / f"{file}.png")
+        summaries[name] = json.loads((pictures / "summary.json").read_text())
+        diameter = summaries[name]["mean_grain_diameter_mm"]
+        assert abs(diameter / (2e3 * RADIUS) - 1) < 0.02, f"mean diameter {diameter} mm instead of {2e3 * RADIUS}"
+        assert summaries[name]["bodies"] == GRAINS**2 and summaries[name]["points"] == len(disks()[0]), summaries[name]
+    for file in ("grains_75_uniform.png", "grains_75_compare.png"):
+        check_picture(scratch / "banded" / "pictures" / file)
+    check_bands(summaries["banded"], band)
+    check_bands(summaries["uniform"], (0.0, WIDTH))
+    assert abs(summaries["banded"]["plastic_work_ratio_to_this_run"]["uniform"] - 5) < 1e-12, summaries["banded"]
+
+
+def real(cairn: Program, scratch: Path):
+    """The results of the program itself, in two and three dimensions; too short for a shear band."""
+    shortened = {"shear_small": {"time.steps": 20},
+                 "spheres_box": {"time.steps": 4, "domain.cell_size": 0.025, "output.checkpoint": "{}"}}
+    for name, settings in shortened.items():
+        out = scratch / name
+        done = cairn("run", ROOT / "cases" / f"{name}.toml", "--out", out, *sets(settings), ranks=2)
+        assert done.code == 0, done.err
+        said = plot(out)
+        for file in ("grains_start", "grains_end", "energy"):
+            check_picture(out / "pictures" / f"{file}.png")
+        for number in (value for key, value in json.loads((out / "pictures" / "summary.json").read_text()).items()
+                       if key in ("bodies", "points")):
+            assert number > 0, said
+    check_picture(scratch / "shear_small" / "pictures" / "principal_stress.png")
+    assert "no displacement_profile" in said, said
+
+
+def nothing(scratch: Path):
+    """A folder without results is refused in one line."""
+    (scratch / "empty").mkdir()
+    done = subprocess.run([ROOT / "scripts" / "plot", scratch / "empty"], capture_output=True, text=True, check=False)
+    assert done.returncode == 2 and "no case.toml" in done.stderr, done.stderr
+    assert "Traceback" not in done.stderr, done.stderr
+
+
+def main():
+    cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
+    nothing(scratch)
+    synthetic(scratch)
+    real(cairn, scratch)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,427 @@
+// Contact at a node shared by two, three and four bodies.
+
+#include <gtest/gtest.h>
+
+#include "../support/node_patch.hpp"
+
+namespace cairn {
+namespace {
+
+using namespace test;
+using V = Vec<2>;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+ContactOptions options_of(ContactLaw law, Release release = Release::reaction, double mu = 0.3) {
+  ContactOptions options;
+  options.law = law, options.release = release, options.friction = mu;
+  options.fill = 0;
+  return options;
+}
+
+/// Two bodies of mass 1 and 3 at the node: body 0 on the left comes to the right and rubs upwards.
+std::vector<NodeBody<2>> meeting_pair() {
+  NodeBody<2> left, right;
+  left.mass = 1, left.momentum = V(4, 2), left.gradient = V(2, 0);
+  right.mass = 3, right.momentum = V(0, 0), right.gradient = V(-1, 0);
+  return {left, right};
+}
+
+/// Fails unless found and expected agree to round-off.
+template <int Dim>
+void expect_close(const Vec<Dim>& found, const Vec<Dim>& expected, double size = 1) {
+  EXPECT_LE((found - expected).norm(), 1e-14 * size) << found.transpose() << " for " << expected.transpose();
+}
+
+template <class F>
+void for_laws(F&& check) {
+  for (ContactLaw law : {ContactLaw::stick, ContactLaw::frictionless, ContactLaw::friction})
+    for (Release release : {Release::approach, Release::traction, Release::reaction})
+      for (double limit : {0.0, 1e-3}) {
+        SCOPED_TRACE(testing::Message() << "law " << static_cast<int>(law) << ", release " << static_cast<int>(release)
+                                        << ", limit " << limit);
+        ContactOptions options = options_of(law, release);
+        options.impulse_limit = limit;
+        check(options);
+      }
+}
+
+/// Momentum of the node before and after every pass, for 2, 3 and 4 bodies of random properties.
+template <int Dim>
+void check_momentum(const ContactOptions& options) {
+  Random random(3);
+  int acted = 0;
+  for (int k = 0; k < 300; ++k) {
+    std::vector<NodeBody<Dim>> list;
+    for (int b = 0; b < 2 + k % 3; ++b) list.push_back(random_body<Dim>(random));
+    NodePatch<Dim> node(list);
+    const auto settings = node.settings(options);
+    const int n = static_cast<int>(list.size());
+    const auto total = [&](auto&& of_body) {
+      Vec<Dim> sum = Vec<Dim>::Zero();
+      for (int b = 0; b < n; ++b) sum += of_body(b);
+      return sum;
+    };
+    const Vec<Dim> p = total([&](int b) { return node.momentum(b); }), f = total([&](int b) { return node.force(b); });
+    node.first(settings);
+    for (int b = 0; b < n; ++b) acted += node.momentum(b) != list[b].momentum;
+    expect_close<Dim>(total([&](int b) { return node.momentum(b); }), p, 10);
+    node.second(settings);
+    for (int b = 0; b < n; ++b) acted += node.force(b) != list[b].force;
+    expect_close<Dim>(total([&](int b) { return node.force(b); }), f, 1000 / node.dt);
+    node.repeat(settings);
+    expect_close<Dim>(total([&](int b) { return node.projected(b); }), p, 10);
+  }
+  EXPECT_GT(acted, 300);
+}
+TEST(ContactSweep, ImpulsesSumToZero) {
+  for_laws(check_momentum<2>);
+  for_laws(check_momentum<3>);
+}
+
+template <int Dim>
+void check_sticking(ContactLaw law) {
+  Random random(4);
+  for (int n = 2; n <= 4; ++n) {
+    std::vector<NodeBody<Dim>> list;
+    double M = 0;
+    Vec<Dim> p = Vec<Dim>::Zero(), f = p;
+    for (int b = 0; b < n; ++b) {
+      list.push_back(random_body<Dim>(random));
+      M += list[b].mass, p += list[b].momentum, f += list[b].force;
+    }
+    NodePatch<Dim> node(list);
+    const auto settings = node.settings(options_of(law));
+    node.first(settings);
+    for (int b = 0; b < n; ++b) expect_close<Dim>(node.momentum(b) / node.mass(b), p / M, 100);
+    node.second(settings);
+    for (int b = 0; b < n; ++b) expect_close<Dim>(node.updated(b) / node.mass(b), (p + node.dt * f) / M, 100);
+    node.repeat(settings);
+    for (int b = 0; b < n; ++b) expect_close<Dim>(node.projected(b) / node.mass(b), p / M, 100);
+  }
+}
+TEST(ContactSweep, StickingGivesTheCentreOfMassVelocity) {
+  for (ContactLaw law : {ContactLaw::stick, ContactLaw::none}) {
+    check_sticking<2>(law);
+    check_sticking<3>(law);
+  }
+}
+
+TEST(ContactSweep, FrictionOfAPairWorkedByHand) {
+  // v_cm = (1, 0.5). Body 0: P = (4,2) - (1,0.5) = (3, 1.5); with mu = 0.3 it gets (-3, -0.9).
+  NodePatch<2> node(meeting_pair());
+  node.first(node.settings(options_of(ContactLaw::friction, Release::approach)));
+  expect_close<2>(node.momentum(0), V(1, 1.1), 10);
+  expect_close<2>(node.momentum(1), V(3, 0.9), 10);
+  NodePatch<2> smooth(meeting_pair());
+  smooth.first(smooth.settings(options_of(ContactLaw::frictionless, Release::approach)));
+  expect_close<2>(smooth.momentum(0), V(1, 2), 10);
+}
+
+TEST(ContactSweep, ReactionDecidesOnceAndKeepsIt) {
+  // P0 = (3, 1.5) as above; F0 = f_0 - f/4 = (-400, 0): thrown apart by the end of the step.
+  auto list = meeting_pair();
+  list[0].force = V(-400, 0), list[1].force = V(400, 0);
+  NodePatch<2> node(list);
+  const auto settings = node.settings(options_of(ContactLaw::friction));
+  node.first(settings);
+  node.second(settings);
+  node.repeat(settings);
+  for (int b = 0; b < 2; ++b) {
+    EXPECT_EQ(node.momentum(b), list[b].momentum);
+    EXPECT_EQ(node.force(b), list[b].force);
+    EXPECT_EQ(node.projected(b), list[b].momentum);
+  }
+  // Half the force: held. The first pass stops the approach, the second has nothing to push, and what is projected
+  // again is held without friction, for it pulls apart.
+  list[0].force = V(-200, 0), list[1].force = V(200, 0);
+  NodePatch<2> held(list);
+  held.first(settings);
+  expect_close<2>(held.momentum(0), V(1, 2), 10);
+  held.second(settings);
+  expect_close<2>(held.force(0), list[0].force, 1000);
+  held.repeat(settings);
+  expect_close<2>(held.projected(0), V(1, 2), 10);
+}
+
+TEST(ContactSweep, CommonNormalIsThatOfTheLargerGradient) {
+  auto list = meeting_pair();
+  list[0].gradient = V(0.1, 0.1), list[1].gradient = V(-2, 0);  // a corner of body 0 on a face of body 1
+  NodePatch<2> node(list);
+  node.first(node.settings(options_of(ContactLaw::frictionless, Release::approach)));
+  expect_close<2>(node.momentum(0), V(1, 2), 10);
+  list[0].gradient = V(3, 3), list[1].gradient = V(-2, 0);
+  NodePatch<2> tilted(list);
+  tilted.first(tilted.settings(options_of(ContactLaw::frictionless, Release::approach)));
+  expect_close<2>(tilted.momentum(0), V(4 - 2.25, 2 - 2.25), 10);  // P . (1,1)/2 = 2.25
+}
+
+TEST(ContactSweep, WithoutAnyGradientNothingHappens) {
+  auto list = meeting_pair();
+  list[0].gradient = list[1].gradient = V(0, 0);
+  NodePatch<2> node(list);
+  node.first(node.settings(options_of(ContactLaw::friction, Release::approach)));
+  EXPECT_EQ(node.momentum(0), list[0].momentum);
+}
+
+/// Eq. 23 of Bardenhagen, Brackbill & Sulsky 2000 as printed, with eqs. 21 and 22.
+template <int Dim>
+Vec<Dim> equation_23(const Vec<Dim>& v, const Vec<Dim>& v_cm, const Vec<Dim>& outward, double mu) {
+  Vec3 dv = Vec3::Zero(), n = Vec3::Zero();
+  dv.head<Dim>() = v - v_cm, n.head<Dim>() = outward;
+  const double approach = dv.dot(n);
+  if (approach <= 0) return v;
+  const Vec3 cross = dv.cross(n), omega = cross.normalized();
+  const double mu_dash = std::min(mu, cross.norm() / approach);
+  const Vec3 change = approach * (n + mu_dash * n.cross(omega));
+  return v - change.head<Dim>();
+}
+
+template <int Dim>
+void check_own_normals() {
+  Random random(5);
+  int changed = 0;
+  for (int k = 0; k < 200; ++k) {
+    std::vector<NodeBody<Dim>> list;
+    for (int b = 0; b < 2 + k % 3; ++b) list.push_back(random_body<Dim>(random));
+    ContactOptions options = options_of(ContactLaw::friction, Release::approach, 0.4);
+    options.normal_choice = NormalChoice::own;
+    NodePatch<Dim> node(list);
+    node.first(node.settings(options));
+    double M = 0;
+    Vec<Dim> p = Vec<Dim>::Zero();
+    for (const auto& body : list) M += body.mass, p += body.momentum;
+    for (std::size_t b = 0; b < list.size(); ++b) {
+      const Vec<Dim> v = equation_23<Dim>(list[b].velocity(), p / M, list[b].gradient.normalized(), 0.4);
+      expect_close<Dim>(node.momentum(static_cast<int>(b)) / list[b].mass, v, 100);
+      changed += v != list[b].velocity();
+    }
+  }
+  EXPECT_GT(changed, 100);
+}
+TEST(ContactSweep, OwnNormalsReproduceEquation23) {
+  check_own_normals<2>();
+  check_own_normals<3>();
+}
+
+/// A rigid body of any mass keeps its motion; what sticks to it takes its velocity.
+template <int Dim>
+void check_rigid_partner(const ContactOptions& options, bool sticks) {
+  Random random(6);
+  for (int k = 0; k < 50; ++k) {
+    std::vector<NodeBody<Dim>> list;
+    for (int b = 0; b < 2 + k % 3; ++b) list.push_back(random_body<Dim>(random));
+    list[0].rigid = true, list[0].mass = 0.1;  // lighter than the others
+    list[0].gradient = 10 * Vec<Dim>::UnitX(), list[0].force.setZero();
+    for (std::size_t b = 1; b < list.size(); ++b) {  // all come towards it, and are pressed on
+      list[b].gradient = -Vec<Dim>::UnitX();
+      list[b].momentum[0] = list[b].mass * (list[0].velocity()[0] - random(1, 2));
+      list[b].force[0] = -1000 * list[b].mass;
+    }
+    NodePatch<Dim> node(list);
+    const auto settings = node.settings(options);
+    node.first(settings);
+    node.second(settings);
+    node.repeat(settings);
+    EXPECT_EQ(node.momentum(0), list[0].momentum);
+    EXPECT_EQ(node.force(0), list[0].force);
+    EXPECT_EQ(node.projected(0), list[0].momentum);
+    const Vec<Dim> v = list[0].velocity();
+    for (int b = 1; b < static_cast<int>(list.size()); ++b) {
+      EXPECT_NEAR(node.momentum(b)[0] / node.mass(b), v[0], 1e-12);
+      EXPECT_NEAR(node.updated(b)[0] / node.mass(b), v[0], 1e-12);
+      EXPECT_NEAR(node.projected(b)[0] / node.mass(b), v[0], 1e-12);
+      if (!sticks) continue;
+      expect_close<Dim>(node.momentum(b) / node.mass(b), v, 1000);
+      expect_close<Dim>(node.updated(b) / node.mass(b), v, 1000);
+      expect_close<Dim>(node.projected(b) / node.mass(b), v, 1000);
+    }
+  }
+}
+TEST(ContactSweep, RigidPartnerSetsTheVelocity) {
+  check_rigid_partner<2>(options_of(ContactLaw::stick), true);
+  check_rigid_partner<3>(options_of(ContactLaw::stick), true);
+  for (Release release : {Release::approach, Release::reaction}) {
+    check_rigid_partner<2>(options_of(ContactLaw::friction, release, infinity), true);
+    check_rigid_partner<3>(options_of(ContactLaw::friction, release, infinity), true);
+    check_rigid_partner<2>(options_of(ContactLaw::friction, release, 0.1), false);
+    check_rigid_partner<3>(options_of(ContactLaw::frictionless, release), false);
+  }
+}
+
+bool acts(const std::vector<NodeBody<2>>& list, const ContactOptions& options, int at = 3,
+          const std::array<FaceType, 6>& faces = {}) {
+  NodePatch<2> node(list, at);
+  node.first(node.settings(options, 1, faces));
+  return node.momentum(0) != list[0].momentum;
+}
+
+TEST(ContactGates, FillAsksForEnoughVolumeAtTheNode) {
+  ContactOptions options = options_of(ContactLaw::friction);
+  options.fill = 0.8;
+  auto list = meeting_pair();
+  const auto with_volume = [&](double a, double b) {
+    list[0].volume = a, list[1].volume = b;
+    return list;
+  };
+  EXPECT_FALSE(acts(with_volume(0.40, 0.39), options));  // of a cell's volume, 1
+  EXPECT_TRUE(acts(with_volume(0.40, 0.41), options));
+  // On a wall half a cell is full (a quarter in the corner of two); a fixed face admits no contact at all.
+  const FaceType w = FaceType::wall, f = FaceType::free;
+  EXPECT_FALSE(acts(with_volume(0.20, 0.19), options, 0, {w, f, f, f}));
+  EXPECT_TRUE(acts(with_volume(0.20, 0.21), options, 0, {w, f, f, f}));
+  EXPECT_TRUE(acts(with_volume(0.10, 0.11), options, 0, {w, f, w, f}));
+  EXPECT_FALSE(acts(with_volume(0.10, 0.11), options, 0, {f, w, f, w}));  // those walls are far away
+  EXPECT_TRUE(acts(with_volume(0.10, 0.11), options, 8, {f, w, f, w}));
+  EXPECT_FALSE(acts(with_volume(0.9, 0.9), options, 0, {FaceType::fixed, f, f, f}));
+  // Only the predicted reaction asks; sticking joins whatever there is.
+  options.release = Release::approach;
+  EXPECT_TRUE(acts(with_volume(0.1, 0.1), options));
+  options.release = Release::reaction, options.law = ContactLaw::stick;
+  EXPECT_TRUE(acts(with_volume(0.1, 0.1), options));
+}
+
+TEST(ContactGates, SeparationComparesMeanPositions) {
+  ContactOptions options = options_of(ContactLaw::friction, Release::approach);
+  options.separation = 0.8;
+  auto list = meeting_pair();
+  const auto apart = [&](double gap) {
+    list[0].position = V(-0.3, 0.7), list[1].position = V(gap - 0.3, -0.2);
+    list[0].volume = 0.3, list[1].volume = 0.7;
+    return list;
+  };
+  EXPECT_FALSE(acts(apart(0.81), options));
+  EXPECT_TRUE(acts(apart(0.79), options));
+  options.separation = 0;
+  EXPECT_TRUE(acts(apart(0.81), options));
+}
+
+TEST(ContactGates, TractionIsThatOfTheNodeOrOfTheBody) {
+  ContactOptions options = options_of(ContactLaw::friction, Release::traction);
+  auto list = meeting_pair();
+  list[0].momentum = V(-4, 0);  // departing
+  const auto with_stress = [&](double a, double b) {
+    list[0].stress_xx = a, list[1].stress_xx = b;
+    return list;
+  };
+  EXPECT_TRUE(acts(with_stress(-3, 2), options));   // compressive together
+  EXPECT_FALSE(acts(with_stress(-2, 3), options));  // in tension together
+  // Below 1e-9 of the modulus times the volume, 2e-3, it counts as free of stress: departing bodies part.
+  EXPECT_FALSE(acts(with_stress(-1e-3, 0), options));
+  EXPECT_TRUE(acts(with_stress(-3e-3, 0), options));
+  // Body by body: body 0 looks at its own.
+  options.gate = Gate::body;
+  EXPECT_TRUE(acts(with_stress(-2, 3), options));
+  EXPECT_FALSE(acts(with_stress(2, -3), options));
+  // Approaching and free of stress: in contact.
+  list[0].momentum = V(4, 2);
+  EXPECT_TRUE(acts(with_stress(0, 0), options));
+  EXPECT_FALSE(acts(with_stress(1, 1), options));
+}
+
+TEST(ContactGates, TracesOfMassAreScreened) {
+  auto list = meeting_pair();
+  const ContactOptions options = options_of(ContactLaw::friction, Release::approach);
+  list[0].mass = 2e-6, list[0].momentum *= list[0].mass;
+  list[1].mass = 1;
+  EXPECT_TRUE(acts(list, options));
+  list[0].momentum *= 0.25, list[0].mass *= 0.25;
+  EXPECT_FALSE(acts(list, options));
+}
+
+TEST(ContactSettings, PairTable) {
+  ContactOptions options = options_of(ContactLaw::friction, Release::approach, 0.3);
+  options.pairs = {{0, 1, ContactLaw::frictionless, 9.0}, {2, 2, ContactLaw::stick, 0.0}, {1, 2, ContactLaw::friction, 0.7},
+                   {-1, 0, ContactLaw::stick, 0.0}};
+  const auto settings = ContactSettings<2>::make(options, std::vector<ContactMaterial>(3), {});
+  const auto expect = [&](int a, int b, ContactLaw law, double mu) {
+    for (const PairLaw& pair : {settings.pair(a, b), settings.pair(b, a)}) {
+      EXPECT_EQ(pair.law, law) << a << b;
+      EXPECT_EQ(pair.friction, mu) << a << b;
+    }
+  };
+  expect(0, 0, ContactLaw::friction, 0.3);
+  expect(0, 1, ContactLaw::frictionless, 0);
+  expect(0, 2, ContactLaw::friction, 0.3);
+  expect(1, 1, ContactLaw::friction, 0.3);
+  expect(1, 2, ContactLaw::friction, 0.7);
+  expect(2, 2, ContactLaw::stick, 0);
+}
+
+TEST(ContactSweep, PairsOfMaterialsActByTheirOwnLaw) {
+  ContactOptions options = options_of(ContactLaw::friction, Release::approach, 0.3);
+  options.pairs = {{0, 1, ContactLaw::frictionless, 0.0}};
+  auto list = meeting_pair();
+  list[1].material = 1;
+  NodePatch<2> node(list);
+  node.first(node.settings(options, 2));
+  expect_close<2>(node.momentum(0), V(1, 2), 10);
+  list[0].material = 1;
+  NodePatch<2> same(list);
+  same.first(same.settings(options, 2));
+  expect_close<2>(same.momentum(0), V(1, 1.1), 10);
+}
+
+TEST(ContactSweep, OnePassOnly) {
+  auto list = meeting_pair();
+  ContactOptions options = options_of(ContactLaw::friction, Release::approach);
+  options.passes = Passes::after;
+  NodePatch<2> after(list);
+  after.first(after.settings(options));
+  EXPECT_EQ(after.momentum(0), list[0].momentum);
+  after.second(after.settings(options));
+  expect_close<2>(after.updated(0), V(1, 1.1), 10);
+  expect_close<2>(after.updated(1), V(3, 0.9), 10);
+  // Before only: the nodes' momenta return to what they were, and the impulse reaches the points through the force.
+  options.passes = Passes::before;
+  NodePatch<2> before(list);
+  before.first(before.settings(options));
+  expect_close<2>(before.momentum(0), V(1, 1.1), 10);
+  before.second(before.settings(options));
+  expect_close<2>(before.momentum(0), list[0].momentum, 10);
+  expect_close<2>(before.updated(0), V(1, 1.1), 10);
+}
+
+TEST(ContactSweep, LedgerBooksTheEnergyLost) {
+  // After the update only, with momenta that come back from the points unchanged: what these lose is what it gains.
+  ContactOptions options = options_of(ContactLaw::friction, Release::approach);
+  options.passes = Passes::after;
+  NodePatch<2> node(meeting_pair());
+  node.first(node.settings(options));
+  node.second(node.settings(options));
+  node.project_updated();
+  node.repeat(node.settings(options));
+  const double before = 0.5 * V(4, 2).squaredNorm(), now = 0.5 * V(1, 1.1).squaredNorm() + V(3, 0.9).squaredNorm() / 6;
+  EXPECT_NEAR(node.patch.ledger.contact_dissipation, before - now, 1e-13);
+  EXPECT_EQ(node.patch.ledger.boundary_work, 0);
+  EXPECT_EQ(node.patch.ledger.contact_nodes, 1);
+}
+
+TEST(ContactSweep, KeepsWhatPassesBetweenPairs) {
+  auto list = meeting_pair();
+  ContactOptions options = options_of(ContactLaw::friction, Release::approach);
+  options.passes = Passes::after;
+  NodePatch<2> node(list);
+  auto settings = node.settings(options);
+  settings.keep_contacts = true;
+  node.first(settings);
+  node.second(settings);
+  ASSERT_EQ(node.patch.contacts.size(), 1u);
+  const auto& [pair, sum] = *node.patch.contacts.begin();
+  EXPECT_EQ(pair, std::pair(0, 1));
+  const double size = V(3, 0.9).norm();
+  const std::vector<double> expected = {size, -3, -0.9, 3 * size, 3 * size, size, 0};  // normal from 0 to 1: +x
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(sum.values[i], expected[i], 1e-13) << i;
+}
+
+TEST(ContactSweep, VolumeOfAllBodies) {
+  auto list = meeting_pair();
+  list[0].volume = 0.25, list[1].volume = 0.5;
+  NodePatch<2> node(list);
+  node.first(node.settings(options_of(ContactLaw::friction)));
+  EXPECT_DOUBLE_EQ(node.sweep.volume_at({3, 3}), 0.75);
+  EXPECT_DOUBLE_EQ(node.sweep.volume_at({2, 3}), 0);
+}
+
+}  // namespace
+}  // namespace cairn
