@@ -106,16 +106,22 @@ void mirror_vectors(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceCo
 
 template <int Dim>
 void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                        const std::vector<Body>& bodies) {
+                        const std::vector<Body>& bodies, bool close_ledger) {
   for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
-                       [](Piece<Dim>& piece, const Index<Dim>&, int node, const FaceCondition<Dim>& face) {
-                         vector_of<Dim>(piece.nodes.velocity, node) = face.velocity;
-                       });
+                       [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
+    auto velocity = vector_of<Dim>(piece.nodes.velocity, node);
+    if (close_ledger && lattice.owns_node(patch.id, place)) {
+      const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
+      const Vec<Dim> momentum = momentum_of(piece, node), change = mass * face.velocity - momentum;
+      patch.ledger.contact_dissipation += change.dot(face.velocity - 0.5 * (momentum / mass + velocity));
+    }
+    velocity = face.velocity;
+  });
 }
 
 template <int Dim>
 void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                      const std::vector<Body>& bodies, double dt) {
+                      const std::vector<Body>& bodies, double dt, bool close_ledger) {
   using M = NodeMotion<Dim>;
   for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
                        [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
@@ -128,7 +134,7 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
     acceleration = (face.velocity - before) / dt;
     if (!lattice.owns_node(patch.id, place)) return;
     patch.ledger.boundary_work += impulse.dot(face.velocity);
-    patch.ledger.contact_dissipation += 0.5 * mass * (face.velocity - before).squaredNorm();
+    if (close_ledger) patch.ledger.contact_dissipation += 0.5 * mass * (face.velocity - before).squaredNorm();
   });
 }
 
@@ -241,9 +247,10 @@ void WallContact<Dim>::keep_ledger(const Entry& entry, Patch<Dim>& patch, const 
 #define CAIRN_INSTANTIATE(Dim)                                                                                          \
   template void mirror_sums(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);                              \
   template void mirror_vectors(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, AlignedDoubles NodeBox<Dim>::*); \
-  template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&); \
+  template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&, \
+                                   bool);                                                                               \
   template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&, \
-                                 double);                                                                               \
+                                 double, bool);                                                                         \
   template class WallContact<Dim>;
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -86,7 +86,7 @@ void Simulation<Dim>::strain_first(double share) {
     const auto time = timers_.measure(Stage::stress);
     for (auto& patch : patches_) {
       for (auto& piece : patch.pieces) velocity_from_sums(piece);
-      constrain_velocity(patch, lattice_, faces_, bodies_);
+      constrain_velocity(patch, lattice_, faces_, bodies_, false);
       for (auto& piece : patch.pieces) {
         const auto& material = material_of(piece);
         if (is_rigid(piece)) std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
@@ -110,7 +110,7 @@ void Simulation<Dim>::contact_after_update(bool last) {
   }
   const auto time = timers_.measure(Stage::integrate);
   for_pieces([&](Piece<Dim>& piece) { integrate(piece, dt_); });
-  for (auto& patch : patches_) constrain_motion(patch, lattice_, faces_, bodies_, dt_);
+  for (auto& patch : patches_) constrain_motion(patch, lattice_, faces_, bodies_, dt_, last);
 }
 
 template <int Dim>
@@ -141,7 +141,7 @@ void Simulation<Dim>::project_again() {
     walls_[p].repeat_pass(patches_[p], faces_, contact_, dt_);
   }
   for_pieces([&](Piece<Dim>& piece) { velocity_from_momentum(piece); });
-  for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_);
+  for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_, true);
 }
 
 template <int Dim>

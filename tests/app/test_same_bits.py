@@ -24,6 +24,7 @@ PARTITIONS = ("metis", "round_robin")
 SHAPES = ("linear", "gimp", "bspline2")
 STRESS_UPDATES = ("last", "first", "both", "modified_last")
 RELEASES = ("approach", "traction", "reaction")
+MOST_LINES = 8  # of differences between two runs
 FIELDS = '["velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "image"]'
 
 # Shortened, with every output; the spheres on a coarser grid. In both, points cross patches and bodies collide.
@@ -87,7 +88,7 @@ def differences(a: Path, b: Path) -> list[str]:
         return [f"{b.name}: files {sorted(in_a ^ in_b)} are in one of {a.name} and {b.name} only"]
     with hdf5_lock:  # HDF5 serves one thread at a time
         found = [(name, compare_runs.compare_files(a / name, b / name)) for name in sorted(in_a)]
-    return [f"{b.name}: {name}: {line}" for name, lines in found for line in lines]
+    return [f"{b.name}: {name}: {line}" for name, lines in found for line in lines][:MOST_LINES]
 
 
 def run_and_compare(program: Program, case: Path, settings: dict, reference: Path, out: Path, ranks: int) -> list[str]:

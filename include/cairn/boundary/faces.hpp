@@ -27,15 +27,16 @@ template <int Dim>
 void mirror_vectors(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                     AlignedDoubles NodeBox<Dim>::*vectors);
 
-/// Fixed faces: their velocity at the nodes, for strains.
+/// Fixed faces: their velocity at the nodes, for strains. With `close_ledger`, on velocities projected again at the end of
+/// the step, the loss of bringing the points to that velocity goes into the ledger (contact/ledger.hpp).
 template <int Dim>
 void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                        const std::vector<Body>& bodies);
+                        const std::vector<Body>& bodies, bool close_ledger);
 /// Fixed faces, after the momentum update: velocity, and the acceleration that leads to it (Nairn 2013, section 2.4); the
-/// work goes into the ledger.
+/// work goes into the ledger, and with `close_ledger` (nothing is projected again) the loss as well.
 template <int Dim>
 void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                      const std::vector<Body>& bodies, double dt);
+                      const std::vector<Body>& bodies, double dt, bool close_ledger);
 
 /// Contact with walls in one patch, in the same passes as contact between bodies and after it.
 template <int Dim>
