@@ -110,6 +110,7 @@ void read_selection(Table& table, const Draft& draft, Drive& drive, int& given) 
   if (table.has("overlapping")) {
     ++given;
     drive.overlapping = table.choice("overlapping", face_index_names, -1);
+    drive.within = table.number("within", 0.0, not_negative);
     if (drive.overlapping < 0) return;
     const int k = drive.overlapping / 2;
     const auto reaches = [&](const BodySpec& body) { return selects(drive, body, -1, domain); };

@@ -159,15 +159,6 @@ void warn_about_fixed_faces(Case& c) {
 
 }  // namespace
 
-bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain) {
-  if (drive.overlapping < 0)
-    return std::ranges::find(drive.ids, index) != drive.ids.end() ||
-           (!drive.group.empty() && body.group == drive.group);
-  const Bounds b = bounds(body.shape);
-  const int k = drive.overlapping / 2;
-  return drive.overlapping % 2 ? b.upper[k] > domain.upper[k] : b.lower[k] < domain.lower[k];
-}
-
 std::string placement_problem(const Shape& shape, const Domain& domain) {
   const Bounds b = bounds(shape);
   const Vec3 middle = centre(shape);
@@ -224,3 +215,16 @@ void warn_about_bodies(Case& result) {
 }
 
 }  // namespace cairn::reading
+
+namespace cairn {
+
+bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain) {
+  if (drive.overlapping < 0)
+    return std::ranges::find(drive.ids, index) != drive.ids.end() ||
+           (!drive.group.empty() && body.group == drive.group);
+  const Bounds b = bounds(body.shape);
+  const int k = drive.overlapping / 2;
+  return drive.overlapping % 2 ? b.upper[k] > domain.upper[k] - drive.within : b.lower[k] < domain.lower[k] + drive.within;
+}
+
+}  // namespace cairn

@@ -51,8 +51,6 @@ Vec3 read_angular_velocity(Table& table, int dimension);
 
 /// What is wrong with the place of a body; empty when nothing is.
 std::string placement_problem(const Shape& shape, const Domain& domain);
-/// True where the drive selects body number `index`: the same rule as at set-up.
-bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain);
 /// Adds the warnings: overlapping balls, bodies thinner than two cells, bodies held by a fixed face.
 void warn_about_bodies(Case& result);
 

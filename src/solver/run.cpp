@@ -99,7 +99,7 @@ class Run {
     double output_wall = 0;
     ProgressDisplay display;
     while (simulation_.time() < case_.time.end && simulation_.steps() < case_.time.steps) {
-      simulation_.step(case_.time.end - simulation_.time());
+      advance();
       const double before = wall_clock();
       write_outputs(false);
       if (rank_ == 0 && display.due(before)) display.show(progress(before - stepping), before);
@@ -107,23 +107,39 @@ class Run {
     }
     const double step_wall = wall_clock() - stepping - output_wall;
     write_outputs(true);
-    throw_together(comm_, history_.error() + bodies_.error());
+    throw_together(comm_, file_error());
     display.finish();
     report(step_wall);
     return 0;
   }
 
  private:
+  /// One step; when it fails, the points as they are then go to a file of their own.
+  void advance() {
+    try {
+      simulation_.step(case_.time.end - simulation_.time());
+    } catch (const RunError& error) {
+      const fs::path file = settings_.out / "failure_particles.vtkhdf";
+      write_particles(simulation_, file, case_.output.particles.fields);
+      throw RunError(fmt::format("{}; the state then is in {}", error.what(), file.string()));
+    }
+  }
+
   void open_files() {
     std::string error;
     if (rank_ == 0 && settings_.overwrite) error = remove_results(settings_.out);
     if (rank_ == 0 && error.empty()) {
-      std::ofstream(settings_.out / "case.toml") << case_.resolved;
+      std::ofstream text(settings_.out / "case.toml");
+      if (!(text << case_.resolved << std::flush)) error = fmt::format("cannot write {}", (settings_.out / "case.toml").string());
+    }
+    if (rank_ == 0 && error.empty()) {
       history_ = CsvWriter(settings_.out / "history.csv", history_columns(Dim));
       if (!case_.output.track.empty()) bodies_ = CsvWriter(settings_.out / "bodies.csv", body_columns(Dim));
     }
-    throw_together(comm_, error + history_.error() + bodies_.error());
+    throw_together(comm_, error.empty() ? file_error() : error);
   }
+
+  std::string file_error() const { return history_.error().empty() ? bodies_.error() : history_.error(); }
 
   /// Writes what is due; with `all`, everything that is active and not written at this step yet.
   void write_outputs(bool all) {

@@ -37,24 +37,13 @@ SolverMaterial make_material(const Material& spec) {
   return m;
 }
 
-/// True where the body reaches across a face of the domain.
-bool overlaps_face(const BodySpec& body, const Domain& domain, int face) {
-  const Bounds b = bounds(body.shape);
-  const int d = face / 2;
-  return face % 2 == 0 ? b.lower[d] < domain.lower[d] : b.upper[d] > domain.upper[d];
-}
-
 std::vector<Body> make_bodies(const Case& c, const std::vector<SolverMaterial>& materials) {
   std::vector<Body> bodies;
   for (const auto& spec : c.bodies)
     bodies.push_back({spec.material, materials[spec.material].rigid, spec.velocity, spec.angular_velocity, centre(spec.shape)});
   for (const auto& drive : c.drives) {
-    const std::set<int> ids(drive.ids.begin(), drive.ids.end());
     for (std::size_t b = 0; b < bodies.size(); ++b) {
-      const bool chosen = drive.overlapping >= 0 ? overlaps_face(c.bodies[b], c.domain, drive.overlapping)
-                                                 : ids.count(static_cast<int>(b)) > 0 ||
-                                                       (!drive.group.empty() && c.bodies[b].group == drive.group);
-      if (!chosen) continue;
+      if (!selects(drive, c.bodies[b], static_cast<int>(b), c.domain)) continue;
       bodies[b].rigid = true;
       bodies[b].velocity = drive.velocity;
       bodies[b].angular_velocity = drive.angular_velocity;

@@ -166,7 +166,7 @@ std::map<std::pair<int, Index<Dim>>, NodeValues<Dim>> naive_sums(const World<Dim
 
 /// The same numbers as a piece holds them.
 template <int Dim>
-NodeValues<Dim> values_at(const NodeBox<Dim>& nodes, const Index<Dim>& i) {
+NodeValues<Dim> values_at(const NodeBox<Dim>& nodes, const std::type_identity_t<Index<Dim>>& i) {
   NodeValues<Dim> values{};
   if (!nodes.box.contains(i)) return values;
   const std::size_t at = nodes.box.offset(i);
@@ -276,7 +276,7 @@ TEST(NodeExchange, GhostsComeAndGo) {
   const auto at = [&](double x, double y) {
     return Vec<2>(lattice.lower()[0] + x * lattice.spacing()[0], lattice.lower()[1] + y * lattice.spacing()[1]);
   };
-  for (int body = 0; body < 2; ++body) points.push_back({body, body, random_point<2>(random, at(3.9, 1.5), 1)});
+  for (int body = 0; body < 2; ++body) points.push_back({body, body, random_point<2>(random, at(3.9, 1.4), 1)});
   World<2> world(lattice, points, MPI_COMM_WORLD);
   const auto bodies_in = [&](int id) {
     std::vector<std::pair<int, int>> bodies;  // body, points
@@ -292,7 +292,9 @@ TEST(NodeExchange, GhostsComeAndGo) {
   if (world.patch(1)) {  // known from the neighbour
     EXPECT_EQ(bodies_in(1), (Bodies{{0, 0}, {1, 0}}));
   }
-  if (world.patch(3)) EXPECT_EQ(bodies_in(3), Bodies{});                  // its nodes start higher up
+  if (world.patch(3)) {  // its nodes start higher up
+    EXPECT_EQ(bodies_in(3), Bodies{});
+  }
   // Body 1 leaves for the middle of patch 0, out of its neighbours' sight.
   if (Patch<2>* patch = world.patch(0)) patch->pieces[1].points.column(0)[0] = at(1.4, 0)[0];
   world.sum_points();

@@ -50,6 +50,7 @@ struct BodySpec {
 /// Bodies moved as rigid parts. Exactly one of the three selections is used.
 struct Drive {
   int overlapping = -1;    // index into face_names: bodies whose shape reaches across that face; -1: unused
+  double within = 0;       // with overlapping: or comes closer to it than this [m]
   std::vector<int> ids;
   std::string group;
   Vec3 velocity = Vec3::Zero();          // [m/s]
@@ -93,6 +94,9 @@ struct Case {
   std::vector<std::string> warnings;
   std::string resolved;  // the text of case.toml: every default and override filled in
 };
+
+/// True where the drive selects the body, which has the number `index`.
+bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain);
 
 /// One `--set KEY=VALUE`.
 struct Override {
