@@ -28,7 +28,7 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   read_drives(root, draft);
   read_boundary(root.table("boundary"), c.domain, c.faces);
-  read_parallel(root.table("parallel"), c.partition);
+  read_parallel(root.table("parallel"), c.parallel);
   read_output(root.table("output"), draft, c.output);
   root.finish();
   if (errors.count() == 0 && c.bodies.empty())

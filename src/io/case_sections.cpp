@@ -219,8 +219,10 @@ void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& fa
   boundary.finish();
 }
 
-void read_parallel(Table parallel, Partition& partition) {
-  partition = parallel.choice("partition", partition_names, partition);
+void read_parallel(Table parallel, ParallelOptions& result) {
+  result.partition = parallel.choice("partition", partition_names, result.partition);
+  result.balance_every = static_cast<int>(parallel.integer("balance_every", result.balance_every, 0, 1'000'000'000));
+  result.imbalance = parallel.number("imbalance", result.imbalance, Range{1, infinity, false, false, false});
   parallel.finish();
 }
 

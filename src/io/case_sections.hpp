@@ -27,7 +27,7 @@ void read_time(Table time, Time& result);
 void read_solver(Table solver, int dimension, SolverOptions& result);
 void read_contact(Table contact, const std::vector<Material>& materials, ContactOptions& result);
 void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& faces);
-void read_parallel(Table parallel, Partition& partition);
+void read_parallel(Table parallel, ParallelOptions& result);
 void read_output(Table output, const Draft& draft, Output& result);
 void read_materials(Table materials, std::vector<Material>& result);
 /// The shape a table describes; nothing after an error.

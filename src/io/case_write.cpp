@@ -202,9 +202,11 @@ void write_boundary(Writer& out, const Case& c) {
   }
 }
 
-void write_parallel(Writer& out, Partition partition) {
+void write_parallel(Writer& out, const ParallelOptions& parallel) {
   out.section("[parallel]");
-  out.key("partition", name_of(partition_names, partition));
+  out.key("partition", name_of(partition_names, parallel.partition));
+  out.key("balance_every", parallel.balance_every);
+  out.key("imbalance", parallel.imbalance);
 }
 
 void write_schedule(Writer& out, std::string_view name, const Schedule& s, const std::string& more = {}) {
@@ -238,7 +240,7 @@ std::string write_case(const Draft& draft) {
   write_contact(out, c);
   write_bodies(out, draft);
   write_boundary(out, c);
-  write_parallel(out, c.partition);
+  write_parallel(out, c.parallel);
   write_output(out, c.output);
   return out.take();
 }

@@ -38,9 +38,18 @@ std::string replace_text(const std::filesystem::path& file, const std::string& t
 }  // namespace
 
 void SeriesIndex::add(const std::string& name, double time, MPI_Comm comm) {
+  entries_.push_back({name, time});
+  write(comm);
+}
+
+void SeriesIndex::restore(std::vector<Entry> entries, MPI_Comm comm) {
+  entries_ = std::move(entries);
+  if (!entries_.empty()) write(comm);
+}
+
+void SeriesIndex::write(MPI_Comm comm) const {
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
-  entries_.push_back({name, time});
   std::string error;
   if (rank == 0) {
     std::string text = "{\n  \"file-series-version\": \"1.0\",\n  \"files\": [\n";

@@ -46,11 +46,10 @@ std::string check_shape(hid_t dataset, const std::string& column, std::int64_t r
 template <class T>
 void TableReader::State::read(const std::string& column, int components, const RowBlocks& wanted,
                               std::span<T> values) const {
-  require_input(wanted.total_rows != rows ? fmt::format("it holds {} rows, not {}", rows, wanted.total_rows)
-                                          : check_rows(wanted, components, values.size()));
+  require_input(check_rows(wanted, components, values.size()));
   const bool exists = H5Lexists(handle, column.c_str(), H5P_DEFAULT) > 0;
   const Handle dataset(exists ? H5Dopen2(handle, column.c_str(), H5P_DEFAULT) : H5I_INVALID_HID, H5Dclose);
-  require_input(dataset.valid() ? check_shape(dataset, column, rows, components) : "it has no column " + column);
+  require_input(dataset.valid() ? check_shape(dataset, column, wanted.total_rows, components) : "it has no column " + column);
 
   errno = 0;
   const Handle in_memory = memory_space(wanted.local_rows(), components), in_file = select_rows(wanted, components);
@@ -88,6 +87,24 @@ double TableReader::time() const { return state_->time; }
 std::int64_t TableReader::step() const { return state_->step; }
 const std::string& TableReader::kind() const { return state_->kind; }
 
+std::int64_t TableReader::rows_of(const std::string& column) const {
+  if (H5Lexists(state_->handle, column.c_str(), H5P_DEFAULT) <= 0) return -1;
+  const Handle dataset(H5Dopen2(state_->handle, column.c_str(), H5P_DEFAULT), H5Dclose);
+  const Handle space(dataset.valid() ? H5Dget_space(dataset) : H5I_INVALID_HID, H5Sclose);
+  hsize_t extent[H5S_MAX_RANK] = {0};
+  return space.valid() && H5Sget_simple_extent_dims(space, extent, nullptr) >= 1 ? static_cast<std::int64_t>(extent[0]) : -1;
+}
+
+bool TableReader::attribute(const std::string& name, double& value) const {
+  const Handle root(H5Gopen2(state_->handle, "/", H5P_DEFAULT), H5Gclose);
+  return hdf5::read_attribute(root, name, value);
+}
+
+bool TableReader::attribute(const std::string& name, std::int64_t& value) const {
+  const Handle root(H5Gopen2(state_->handle, "/", H5P_DEFAULT), H5Gclose);
+  return hdf5::read_attribute(root, name, value);
+}
+
 void TableReader::read(const std::string& column, int components, const RowBlocks& rows,
                        std::span<double> values) const {
   state_->read(column, components, rows, values);
@@ -100,6 +117,11 @@ void TableReader::read(const std::string& column, int components, const RowBlock
 
 void TableReader::read(const std::string& column, int components, const RowBlocks& rows,
                        std::span<std::int64_t> values) const {
+  state_->read(column, components, rows, values);
+}
+
+void TableReader::read(const std::string& column, int components, const RowBlocks& rows,
+                       std::span<std::uint8_t> values) const {
   state_->read(column, components, rows, values);
 }
 

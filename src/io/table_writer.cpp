@@ -11,6 +11,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
+#include "seal.hpp"
 
 namespace cairn {
 
@@ -226,11 +227,13 @@ void TableWriter::write_rows(const std::string& path, int components, const RowB
   require(dataset.close(), "closing dataset " + path);
 }
 
-void TableWriter::finish() {
+void TableWriter::finish(bool sealed) {
   errno = 0;
   require(H5Fflush(handle_, H5F_SCOPE_GLOBAL) >= 0, "flushing");
   errno = 0;
   require(handle_.close(), "closing the file");
+  const std::string unsealed = sealed ? seal(temporary_, comm_) : "";
+  throw_together(comm_, unsealed.empty() ? "" : write_failure(file_, "sealing the file", unsealed));
   throw_together(comm_, rank_ == 0 ? publish(temporary_, file_) : "");
   finished_ = true;
 }

@@ -50,8 +50,8 @@ class TableWriter {
     write_rows(path, components, rows, hdf5::native_type<T>(), values.data(), values.size());
   }
 
-  /// Flushes to disk and renames.
-  void finish();
+  /// Flushes to disk and renames; `sealed` (seal.hpp): with a checksum of the whole file at its end.
+  void finish(bool sealed = false);
 
  private:
   void write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type, const void* values,

@@ -178,7 +178,7 @@ void check_bodies(const Case& c, std::vector<std::int64_t>& points_of_body, MPI_
 
 template <int Dim>
 Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
-    : comm_(comm), solver_(c.solver), limits_(c.time), lattice_(make_lattice<Dim>(c.domain)),
+    : comm_(comm), solver_(c.solver), parallel_(c.parallel), limits_(c.time), lattice_(make_lattice<Dim>(c.domain)),
       transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))), faces_(make_faces<Dim>(c)) {
   MPI_Comm_rank(comm_, &rank_);
   MPI_Comm_size(comm_, &ranks_);
@@ -202,22 +202,15 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
   MPI_Allreduce(MPI_IN_PLACE, count.data(), static_cast<int>(count.size()), MPI_INT64_T, MPI_SUM, comm_);
   check_bodies(c, of_body, comm_);
   total_points_ = std::accumulate(count.begin(), count.end(), std::int64_t{0});
-  owner_ = distribute_patches(lattice_, count, ranks_, c.partition);
+  owner_ = distribute_patches(lattice_, count, ranks_, c.parallel.partition);
 
-  std::set<int> neighbours;
   std::int64_t first_id = 0;
   for (int patch = 0; patch < lattice_.patch_count(); first_id += count[patch], ++patch) {
     if (owner_[patch] != rank_) continue;
     patches_.emplace_back(patch, lattice_);
     filler.fill(patches_.back(), first_id);
-    for (const auto& link : patches_.back().links) neighbours.insert(owner_[link.patch]);
   }
-  neighbours.erase(rank_);
-  sweeps_.resize(patches_.size());
-  walls_.resize(patches_.size());
-  messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
-  exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_);
-  migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_);
+  connect_patches();
 
   for_pieces([&](Piece<Dim>& piece) {
     for (int p = 0; p < piece.points.size(); ++p) {

@@ -2,8 +2,11 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
+#include "cairn/parallel/balance.hpp"
 
 #include <fmt/format.h>
+
+#include <set>
 
 namespace cairn {
 namespace {
@@ -32,6 +35,7 @@ void Simulation<Dim>::step(double longest) {
   migrate_points();
   time_ += dt_;
   ++steps_;
+  if (parallel_.balance_every > 0 && steps_ % parallel_.balance_every == 0) balance();
 }
 
 template <int Dim>
@@ -53,10 +57,11 @@ void Simulation<Dim>::project_points() {
   }
   const auto project_where = [&](bool shared) {
     const auto time = timers_.measure(Stage::project);
-    for (auto& patch : patches_)
+    for_patches([&](std::size_t, Patch<Dim>& patch) {
       for (auto& piece : patch.pieces)
         if (NodeExchange<Dim>::shares_nodes(patch, piece) == shared)
           project(piece, lattice_, transfer_, material_of(piece).density);
+    });
   };
   project_where(true);
   {
@@ -72,19 +77,19 @@ void Simulation<Dim>::project_points() {
 template <int Dim>
 void Simulation<Dim>::contact_before_update() {
   const auto time = timers_.measure(Stage::contact);
-  for (std::size_t p = 0; p < patches_.size(); ++p) {
-    sweeps_[p].find(patches_[p], lattice_, contact_, bodies_);
-    walls_[p].find(patches_[p], lattice_, faces_, contact_, sweeps_[p], bodies_);
-    sweeps_[p].first_pass(patches_[p], lattice_, contact_, dt_);
-    walls_[p].first_pass(patches_[p], faces_, contact_, dt_);
-  }
+  for_patches([&](std::size_t p, Patch<Dim>& patch) {
+    sweeps_[p].find(patch, lattice_, contact_, bodies_);
+    walls_[p].find(patch, lattice_, faces_, contact_, sweeps_[p], bodies_);
+    sweeps_[p].first_pass(patch, lattice_, contact_, dt_);
+    walls_[p].first_pass(patch, faces_, contact_, dt_);
+  });
 }
 
 template <int Dim>
 void Simulation<Dim>::strain_first(double share) {
   {
     const auto time = timers_.measure(Stage::stress);
-    for (auto& patch : patches_) {
+    for_patches([&](std::size_t, Patch<Dim>& patch) {
       for (auto& piece : patch.pieces) velocity_from_sums(piece);
       constrain_velocity(patch, lattice_, faces_, bodies_, false);
       for (auto& piece : patch.pieces) {
@@ -92,7 +97,7 @@ void Simulation<Dim>::strain_first(double share) {
         if (is_rigid(piece)) std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
         else update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
       }
-    }
+    });
   }
   const auto time = timers_.measure(Stage::exchange);
   exchange_->sum(patches_, &NodeBox<Dim>::force);
@@ -103,10 +108,10 @@ template <int Dim>
 void Simulation<Dim>::contact_after_update(bool last) {
   {
     const auto time = timers_.measure(Stage::contact);
-    for (std::size_t p = 0; p < patches_.size(); ++p) {
-      sweeps_[p].second_pass(patches_[p], lattice_, contact_, dt_, last);
-      walls_[p].second_pass(patches_[p], faces_, contact_, dt_, last);
-    }
+    for_patches([&](std::size_t p, Patch<Dim>& patch) {
+      sweeps_[p].second_pass(patch, lattice_, contact_, dt_, last);
+      walls_[p].second_pass(patch, faces_, contact_, dt_, last);
+    });
   }
   const auto time = timers_.measure(Stage::integrate);
   for_pieces([&](Piece<Dim>& piece) { integrate(piece, dt_); });
@@ -136,10 +141,10 @@ void Simulation<Dim>::project_again() {
     for (auto& patch : patches_) mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::velocity);
   }
   const auto time = timers_.measure(Stage::contact);
-  for (std::size_t p = 0; p < patches_.size(); ++p) {
-    sweeps_[p].repeat_pass(patches_[p], lattice_, contact_, dt_);
-    walls_[p].repeat_pass(patches_[p], faces_, contact_, dt_);
-  }
+  for_patches([&](std::size_t p, Patch<Dim>& patch) {
+    sweeps_[p].repeat_pass(patch, lattice_, contact_, dt_);
+    walls_[p].repeat_pass(patch, faces_, contact_, dt_);
+  });
   for_pieces([&](Piece<Dim>& piece) { velocity_from_momentum(piece); });
   for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_, true);
 }
@@ -207,10 +212,43 @@ void Simulation<Dim>::start_speed_reduction() {
 
 template <int Dim>
 void Simulation<Dim>::finish_speed_reduction() {
-  if (speed_request_ == MPI_REQUEST_NULL) return;
+  if (speed_request_ == MPI_REQUEST_NULL) return;  // done already
   MPI_Wait(&speed_request_, MPI_STATUS_IGNORE);
   if (speed_result_[2] > 0)
     throw RunError(fmt::format("step {}: {}", steps_, common_error(comm_, migration_->failure())));
+}
+
+template <int Dim>
+void Simulation<Dim>::connect_patches() {
+  std::set<int> neighbours;
+  for (const auto& patch : patches_)
+    for (const auto& link : patch.links) neighbours.insert(owner_[link.patch]);
+  neighbours.erase(rank_);
+  sweeps_.assign(patches_.size(), {});
+  walls_.assign(patches_.size(), {});
+  const Traffic traffic = messages_ ? messages_->traffic() : Traffic{};
+  messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
+  messages_->traffic() = traffic;
+  exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_);
+  migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_);
+}
+
+/// Looks at the work of all ranks since the last time, and deals the patches out anew where that evens it out.
+template <int Dim>
+void Simulation<Dim>::balance() {
+  if (ranks_ == 1 || parallel_.partition != Partition::metis) return;
+  const auto time = timers_.measure(Stage::migrate);
+  finish_speed_reduction();
+  std::vector<std::int64_t> work(lattice_.patch_count(), 0);
+  for (auto& patch : patches_) work[patch.id] = static_cast<std::int64_t>(patch.seconds * 1e9), patch.seconds = 0;
+  MPI_Allreduce(MPI_IN_PLACE, work.data(), static_cast<int>(work.size()), MPI_INT64_T, MPI_SUM, comm_);
+  const double now = imbalance_of(work, owner_, ranks_);
+  if (now < parallel_.imbalance) return;
+  const auto parts = distribute_patches(lattice_, work, ranks_, Partition::metis);
+  const auto owner = keep_in_place(parts, owner_, work, ranks_);
+  if (imbalance_of(work, owner, ranks_) > 0.95 * now) return;
+  move_patches(patches_, owner_, owner, lattice_, comm_);
+  connect_patches();
 }
 
 template class Simulation<2>;

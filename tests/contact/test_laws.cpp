@@ -29,7 +29,8 @@ TEST(ApproachLaw, WorkedByHand) {
   expect_vector(approach_impulse<2>(V(-3, 4), x, infinity), V(0, 0));
   expect_vector(approach_impulse<2>(V(0, 4), x, infinity), V(0, 0));  // no 0 x infinity
   expect_vector(approach_impulse<2>(V(3, 0), x, infinity), V(-3, 0));
-  expect_vector(approach_impulse<2>(V(5, 0), V(0.6, 0.8), 0.25), V(-3, 0.0) * 0.6 + V(0, -3) * 0.8 - 0.75 * V(0.8, -0.6));
+  expect_vector(approach_impulse<2>(V(5, 0), V(0.6, 0.8), 0.25),
+                V(-3, 0.0) * 0.6 + V(0, -3) * 0.8 - 0.75 * V(0.8, -0.6));
 }
 
 TEST(FrictionLimit, IsNeverNegativeNorUndefined) {
@@ -115,7 +116,8 @@ TEST(ReactionLaw, GivesThePointsWhatTheNodeReceives) {
 }
 
 TEST(TractionLaw, ApproachingPairsRubLikeOthers) {
-  for (DepartingFriction departing : {DepartingFriction::none, DepartingFriction::coulomb, DepartingFriction::printed}) {
+  for (DepartingFriction departing :
+       {DepartingFriction::none, DepartingFriction::coulomb, DepartingFriction::printed}) {
     expect_vector(traction_impulse<2>(V(3, 4), x, 0.5, true, false, departing), V(-3, -1.5));
     expect_vector(traction_impulse<2>(V(3, 4), x, 0.5, false, true, departing), V(-3, -1.5));
     // In tension: let go, approaching or not. Free of stress and departing: let go.

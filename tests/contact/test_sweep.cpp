@@ -331,7 +331,9 @@ TEST(ContactGates, TracesOfMassAreScreened) {
 
 TEST(ContactSettings, PairTable) {
   ContactOptions options = options_of(ContactLaw::friction, Release::approach, 0.3);
-  options.pairs = {{0, 1, ContactLaw::frictionless, 9.0}, {2, 2, ContactLaw::stick, 0.0}, {1, 2, ContactLaw::friction, 0.7},
+  options.pairs = {{0, 1, ContactLaw::frictionless, 9.0},
+                   {2, 2, ContactLaw::stick, 0.0},
+                   {1, 2, ContactLaw::friction, 0.7},
                    {-1, 0, ContactLaw::stick, 0.0}};
   const auto settings = ContactSettings<2>::make(options, std::vector<ContactMaterial>(3), {});
   const auto expect = [&](int a, int b, ContactLaw law, double mu) {

@@ -142,9 +142,9 @@ void check_order_of_sums(const Lattice<Dim>& lattice) {
   std::map<Index<Dim>, std::vector<Contribution<Dim>>> all;  // every patch position of every node, ascending
   for (int p = 0; p < lattice.patch_count(); ++p)
     for_each(lattice.patch_nodes(p), [&](const Index<Dim>& i) { all[canonical(lattice, i)].emplace_back(p, i); });
-  for (auto& [node, contributions] : all) std::sort(contributions.begin(), contributions.end(), [](auto& a, auto& b) {
-    return a.first != b.first ? a.first < b.first : a.second < b.second;
-  });
+  for (auto& [node, contributions] : all)
+    std::sort(contributions.begin(), contributions.end(),
+              [](auto& a, auto& b) { return a.first != b.first ? a.first < b.first : a.second < b.second; });
   for (int p = 0; p < lattice.patch_count(); ++p) {
     const Patch<Dim> patch(p, lattice);
     for_each(patch.nodes, [&](const Index<Dim>& i) {

@@ -84,7 +84,9 @@ TEST(ShapeFunctions, LinearIsTheHat) { check_formula(LinearShape{}, hat, 1e-13);
 TEST(ShapeFunctions, QuadraticIsTheSpline) { check_formula(QuadraticShape{}, spline, 1e-13); }
 TEST(ShapeFunctions, CellDensityIsEquation24) { check_formula(CellDensityShape{}, cell_density, 1e-13); }
 TEST(ShapeFunctions, GimpIsThePiecewiseFormula) {
-  for (double l : half_sizes) check_formula(GimpShape{{l, l, l}}, [&](double x) { return gimp(x, l); }, 1e-13 / l);
+  for (double l : half_sizes)
+    check_formula(
+        GimpShape{{l, l, l}}, [&](double x) { return gimp(x, l); }, 1e-13 / l);
 }
 
 /// Slopes against central differences, away from the breaks between pieces (multiples of 1/8), where these are exact.
@@ -111,7 +113,8 @@ double average_hat(double x, double l) {
     if (b > x - l && b < x + l) at.push_back(b);
   std::sort(at.begin(), at.end());
   double sum = 0;
-  for (std::size_t i = 1; i < at.size(); ++i) sum += 0.5 * (hat(at[i - 1]).value + hat(at[i]).value) * (at[i] - at[i - 1]);
+  for (std::size_t i = 1; i < at.size(); ++i)
+    sum += 0.5 * (hat(at[i - 1]).value + hat(at[i]).value) * (at[i] - at[i - 1]);
   return sum / (2 * l);
 }
 
@@ -167,7 +170,8 @@ std::map<Index<Dim>, Vec<Dim>> density_gradient(const Lattice<Dim>& lattice, con
   for_each(cells, [&](const Index<Dim>& cell) {
     double w = 1;
     for (int d = 0; d < Dim; ++d)
-      w *= spline((lattice.node_position(d, 0) + (cell[d] + 0.5) * lattice.spacing()[d] - x[d]) / lattice.spacing()[d]).value;
+      w *= spline((lattice.node_position(d, 0) + (cell[d] + 0.5) * lattice.spacing()[d] - x[d]) / lattice.spacing()[d])
+               .value;
     density[cell] = w / lattice.cell_volume();
   });
   std::map<Index<Dim>, Vec<Dim>> gradient;
@@ -227,7 +231,8 @@ void check_stencil(const Shape& shape, Formula&& formula) {
   const double* columns[Dim];
   for (int d = 0; d < Dim; ++d) {
     columns[d] = x[d];
-    for (int lane = 0; lane < lane_count; ++lane) x[d][lane] = lattice.lower()[d] + random(-0.5, 6.5) * lattice.spacing()[d];
+    for (int lane = 0; lane < lane_count; ++lane)
+      x[d][lane] = lattice.lower()[d] + random(-0.5, 6.5) * lattice.spacing()[d];
   }
   const Stencil<Dim, Shape> stencil(lattice, shape, box, columns);
   for (int lane = 0; lane < lane_count; ++lane) {

@@ -98,7 +98,7 @@ TEST_F(CaseFile, FillsInTheDefaults) {
   EXPECT_EQ(c.contact.normals, NormalSource::volume_gradient);
   EXPECT_TRUE(c.contact.pairs.empty());
   EXPECT_EQ(c.faces[0].type, FaceType::free);
-  EXPECT_EQ(c.partition, Partition::metis);
+  EXPECT_EQ(c.parallel.partition, Partition::metis);
   EXPECT_EQ(c.output.history.every, 10);
   EXPECT_FALSE(c.output.particles.active());
   EXPECT_EQ(c.output.particles.fields,
@@ -217,7 +217,7 @@ track = [2, 0]
   EXPECT_EQ(again.drives[2].group, "g");
   EXPECT_EQ(again.faces[0].velocity, Vec3(0, 1, 0));
   EXPECT_EQ(again.faces[2].type, FaceType::periodic);
-  EXPECT_EQ(again.partition, Partition::round_robin);
+  EXPECT_EQ(again.parallel.partition, Partition::round_robin);
   EXPECT_FALSE(again.output.history.active());
   EXPECT_EQ(again.output.particles.fields, std::vector<std::string>{"image"});
   EXPECT_EQ(again.output.track, (std::vector{2, 0}));

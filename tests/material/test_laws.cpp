@@ -1,11 +1,10 @@
 // Constitutive laws against their energies, closed forms and invariances.
 
-#include "../support/tensors.hpp"
-
 #include <gtest/gtest.h>
 
 #include <numbers>
 
+#include "../support/tensors.hpp"
 #include "cairn/core/error.hpp"
 #include "cairn/material/registry.hpp"
 
@@ -15,7 +14,8 @@ namespace {
 using namespace test;
 
 const double G = 30e6, K = 70e6, Y = 0.2e6, H = 5e6;  // [Pa]
-const ParameterValues values = {{"shear_modulus", G}, {"bulk_modulus", K}, {"yield_stress", Y}, {"hardening_modulus", H}};
+const ParameterValues values = {
+    {"shear_modulus", G}, {"bulk_modulus", K}, {"yield_stress", Y}, {"hardening_modulus", H}};
 
 VonMises von_mises(double hardening) {
   ParameterValues v = values;
@@ -68,7 +68,8 @@ void check_energy_derivative() {
         if (!stored<Dim>(i, j)) continue;
         Mat3 up = F, down = F;
         up(i, j) += h, down(i, j) -= h;
-        const double slope = (law.strain_energy(tensor<Dim>(up), nullptr) - law.strain_energy(tensor<Dim>(down), nullptr)) / (2 * h);
+        const double slope =
+            (law.strain_energy(tensor<Dim>(up), nullptr) - law.strain_energy(tensor<Dim>(down), nullptr)) / (2 * h);
         EXPECT_NEAR(P(i, j), slope, 2e-8 * (P.norm() + G));
       }
   }

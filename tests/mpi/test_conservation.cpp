@@ -32,7 +32,7 @@ void check_collision(Case c, int steps) {
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   for (Partition partition : {Partition::metis, Partition::round_robin}) {
-    c.partition = partition;
+    c.parallel.partition = partition;
     Simulation<Dim> shared(c, MPI_COMM_WORLD), alone(c, MPI_COMM_SELF);
     const Totals start = shared.totals();
     for (int i = 0; i < steps; ++i) shared.step(1e300), alone.step(1e300);

@@ -72,7 +72,8 @@ struct World {
   World(const Lattice<Dim>& lattice_, const std::vector<GlobalPoint<Dim>>& points, MPI_Comm comm) : lattice(lattice_) {
     int rank = 0, ranks = 1;
     MPI_Comm_rank(comm, &rank), MPI_Comm_size(comm, &ranks);
-    owner = distribute_patches(lattice, std::vector<std::int64_t>(lattice.patch_count(), 1), ranks, Partition::round_robin);
+    owner =
+        distribute_patches(lattice, std::vector<std::int64_t>(lattice.patch_count(), 1), ranks, Partition::round_robin);
     std::set<int> neighbours;
     for (int id = 0; id < lattice.patch_count(); ++id) {
       if (owner[id] != rank) continue;
@@ -126,7 +127,8 @@ struct World {
 template <int Dim>
 using NodeValues = std::array<double, NodeSums<Dim>::used + Dim + NodeExtras<Dim>::used>;
 
-/// Global sums by body and node (reduced to one period): every point to all nodes within three cells, whatever its weight.
+/// Global sums by body and node (reduced to one period): every point to all nodes within three cells, whatever its
+/// weight.
 template <int Dim>
 std::map<std::pair<int, Index<Dim>>, NodeValues<Dim>> naive_sums(const World<Dim>& world,
                                                                  const std::vector<GlobalPoint<Dim>>& points) {
@@ -155,7 +157,8 @@ std::map<std::pair<int, Index<Dim>>, NodeValues<Dim>> naive_sums(const World<Dim
         for (int e = 0; e < Dim; ++e) *to -= flux(d, e) * g[e];
         ++to;
       }
-      if constexpr (Dim == 2) *to++ += w * flux(0, 0), *to++ += w * flux(1, 1), *to++ += w * flux(0, 1);
+      if constexpr (Dim == 2)
+        *to++ += w * flux(0, 0), *to++ += w * flux(1, 1), *to++ += w * flux(0, 1);
       else
         for (auto [r, c] : {std::pair{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {0, 2}}) *to++ += w * flux(r, c);
       for (int d = 0; d < Dim; ++d) *to++ += w * V * (point.state.x[d] - world.lattice.node_position(d, i[d]));
@@ -195,11 +198,13 @@ void expect_naive_sums(World<Dim>& world, const std::vector<GlobalPoint<Dim>>& p
         const auto at = expected.find({body, canonical(world.lattice, i)});
         const NodeValues<Dim> sums = at == expected.end() ? NodeValues<Dim>{} : at->second;
         const NodeValues<Dim> found = values_at(*nodes, i);
-        for (std::size_t k = 0; k < sums.size(); ++k) worst = std::max(worst, std::abs(found[k] - sums[k]) / largest[k]);
+        for (std::size_t k = 0; k < sums.size(); ++k)
+          worst = std::max(worst, std::abs(found[k] - sums[k]) / largest[k]);
         if (!nodes->box.contains(i)) return;
         for (int d = 0; d < Dim; ++d)
-          worst_again = std::max(worst_again, std::abs(nodes->velocity[nodes->box.offset(i) * vector_width + d] - sums[1 + d]) /
-                                                  largest[1 + d]);
+          worst_again =
+              std::max(worst_again, std::abs(nodes->velocity[nodes->box.offset(i) * vector_width + d] - sums[1 + d]) /
+                                        largest[1 + d]);
       });
     }
   EXPECT_LE(worst, 1e-12);
@@ -316,7 +321,8 @@ TEST(NodeExchange, GhostsComeAndGo) {
 
 /// Where each point goes: up to nearly a patch away, within the half cell allowed beyond faces that are not periodic.
 template <int Dim>
-std::map<std::int64_t, Vec<Dim>> destinations(const Lattice<Dim>& lattice, const std::vector<GlobalPoint<Dim>>& points) {
+std::map<std::int64_t, Vec<Dim>> destinations(const Lattice<Dim>& lattice,
+                                              const std::vector<GlobalPoint<Dim>>& points) {
   Random random(9);
   std::map<std::int64_t, Vec<Dim>> to;
   for (const auto& point : points) {
@@ -338,7 +344,8 @@ Vec<Dim> wrapped(const Lattice<Dim>& lattice, Vec<Dim> x) {
   return x;
 }
 
-/// Ids of every piece after migration by the documented rule: those that stay, then arrivals by (source patch, order there).
+/// Ids of every piece after migration by the documented rule: those that stay, then arrivals by (source patch, order
+/// there).
 template <int Dim>
 std::map<std::pair<int, int>, std::vector<std::int64_t>> expected_order(const World<Dim>& before,
                                                                         const std::map<std::int64_t, Vec<Dim>>& to) {

@@ -1,7 +1,5 @@
 // Who holds which patch: everything dealt out, evenly, and the same every time.
 
-#include "cairn/parallel/distribution.hpp"
-
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -9,6 +7,7 @@
 
 #include "../support/lattices.hpp"
 #include "../support/random.hpp"
+#include "cairn/parallel/distribution.hpp"
 
 namespace cairn {
 namespace {

@@ -47,7 +47,8 @@ void check_momentum(const Case& c, int steps) {
 TEST(Conservation, MomentumInAnObliqueCollisionWithFriction) {
   for (Release release : {Release::reaction, Release::approach, Release::traction})
     for (ShapeFunction shape : {ShapeFunction::gimp, ShapeFunction::bspline2}) {
-      SCOPED_TRACE(testing::Message() << "release " << static_cast<int>(release) << ", shape " << static_cast<int>(shape));
+      SCOPED_TRACE(testing::Message() << "release " << static_cast<int>(release) << ", shape "
+                                      << static_cast<int>(shape));
       Case c = colliding_balls(2, 24, 6);
       c.contact.release = release, c.solver.shape = shape;
       check_momentum<2>(c, 100);
@@ -71,8 +72,11 @@ TEST(Conservation, MomentumAcrossPeriodicBoundaries) {
 }
 TEST(Conservation, MomentumOfPlasticAndHypoelasticBodies) {
   Case c = colliding_balls(2, 24, 6);
-  c.materials[0] = {"metal", "von_mises", 1000,
-                    {{"shear_modulus", 4e3}, {"bulk_modulus", soft_bulk}, {"yield_stress", 100.0}, {"hardening_modulus", 50.0}}};
+  c.materials[0] = {
+      "metal",
+      "von_mises",
+      1000,
+      {{"shear_modulus", 4e3}, {"bulk_modulus", soft_bulk}, {"yield_stress", 100.0}, {"hardening_modulus", 50.0}}};
   c.materials.push_back({"rubber", "hypoelastic", 700, {{"shear_modulus", 3e3}, {"bulk_modulus", 5e3}}});
   c.bodies[1].material = 1;
   check_momentum<2>(c, 100);
@@ -85,8 +89,10 @@ Case touching_pair(bool one_body, ContactLaw law, StressUpdate update) {
   Case c = soft_case(2, 20, 5);
   const BoxShape block{Vec3(0.23, 0.31, 0), Vec3(0.52, 0.59, 0), 0};
   const Ball disk{Vec3(0.67, 0.47, 0), 0.149};
-  if (one_body) add_body(c, Compound{CompoundOperation::union_of, {block, disk}});
-  else add_body(c, block), add_body(c, disk);
+  if (one_body)
+    add_body(c, Compound{CompoundOperation::union_of, {block, disk}});
+  else
+    add_body(c, block), add_body(c, disk);
   c.contact.law = law;
   c.solver.stress_update = update;
   c.time.dt = 1e-3;  // a third of a cell at the wave speed
@@ -114,14 +120,16 @@ std::map<std::pair<double, double>, SolverPoint<2>> run_pair(const Case& c) {
 
 void check_sticking(StressUpdate update) {
   const auto two = run_pair(touching_pair(false, ContactLaw::stick, update));
-  for (const Case& other : {touching_pair(false, ContactLaw::none, update), touching_pair(true, ContactLaw::stick, update)}) {
+  for (const Case& other :
+       {touching_pair(false, ContactLaw::none, update), touching_pair(true, ContactLaw::stick, update)}) {
     const auto one = run_pair(other);
     ASSERT_EQ(one.size(), two.size());
     double difference = 0, motion = 0;
     for (const auto& [start, a] : two) {
       const auto& b = one.at(start);
       difference = std::max({difference, (a.x - b.x).norm(), (a.v - b.v).norm()});
-      for (int i = 0; i < 4; ++i) difference = std::max(difference, std::abs(a.stress.c[i] - b.stress.c[i]) / soft_bulk);
+      for (int i = 0; i < 4; ++i)
+        difference = std::max(difference, std::abs(a.stress.c[i] - b.stress.c[i]) / soft_bulk);
       motion = std::max(motion, std::abs(a.stress.c[0]) / soft_bulk);
     }
     EXPECT_LE(difference, 1e-10);
@@ -160,7 +168,7 @@ void check_translation(StressUpdate update, const Vec3& velocity, int cells, int
 TEST(RigidMotion, TranslationStaysFreeOfStress) {
   for (StressUpdate update : all_updates) {
     SCOPED_TRACE(static_cast<int>(update));
-    check_translation<2>(update, Vec3(1, -0.6, 0), 16, 4);  // four patches wide
+    check_translation<2>(update, Vec3(1, -0.6, 0), 16, 4);   // four patches wide
     check_translation<2>(update, Vec3(-0.3, 0.9, 0), 8, 4);  // two
     check_translation<2>(update, Vec3(1, 1, 0), 6, 4);       // one: its own neighbour
   }

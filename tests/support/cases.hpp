@@ -23,7 +23,8 @@ inline Case soft_case(int dimension, int cells, int patch_cells) {
   return c;
 }
 
-inline void add_body(Case& c, const Shape& shape, const Vec3& velocity = Vec3::Zero(), const Vec3& spin = Vec3::Zero()) {
+inline void add_body(Case& c, const Shape& shape, const Vec3& velocity = Vec3::Zero(),
+                     const Vec3& spin = Vec3::Zero()) {
   BodySpec body;
   body.shape = shape, body.velocity = velocity, body.angular_velocity = spin, body.source = "test";
   c.bodies.push_back(body);

@@ -20,8 +20,10 @@ Lattice<Dim> lattice_of(const Index<Dim>& cells, const std::array<bool, Dim>& pe
 template <int Dim>
 std::vector<Lattice<Dim>> all_lattices() {
   std::vector<Index<Dim>> sizes;
-  if constexpr (Dim == 2) sizes = {{13, 11}, {5, 5}, {9, 4}, {4, 17}, {8, 8}};
-  else sizes = {{9, 8, 5}, {4, 4, 4}, {13, 4, 8}};
+  if constexpr (Dim == 2)
+    sizes = {{13, 11}, {5, 5}, {9, 4}, {4, 17}, {8, 8}};
+  else
+    sizes = {{9, 8, 5}, {4, 4, 4}, {13, 4, 8}};
   std::vector<Lattice<Dim>> lattices;
   for (const auto& cells : sizes)
     for (int choice = 0; choice < 1 << Dim; ++choice) {

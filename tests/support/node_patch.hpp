@@ -14,8 +14,8 @@ template <int Dim>
 struct NodeBody {
   double mass = 1, volume = 1;
   Vec<Dim> momentum = Vec<Dim>::Zero(), gradient = Vec<Dim>::UnitX(), force = Vec<Dim>::Zero();
-  double stress_xx = 0;                        // volume times stress [Pa m^Dim]
-  Vec<Dim> position = Vec<Dim>::Zero();        // mean position relative to the node [m]
+  double stress_xx = 0;                  // volume times stress [Pa m^Dim]
+  Vec<Dim> position = Vec<Dim>::Zero();  // mean position relative to the node [m]
   int material = 0;
   bool rigid = false;
   Vec<Dim> velocity() const { return momentum / mass; }

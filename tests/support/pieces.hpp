@@ -48,14 +48,14 @@ PointState<Dim> get_point(const Points<Dim>& points, int p) {
 /// A random state at x: stress of the order of `stress` [Pa].
 template <int Dim>
 PointState<Dim> random_point(Random& random, const Vec<Dim>& x, double stress) {
-  return {x, random.vector<Dim>(2), Mat3::Identity() + random_matrix<Dim>(random, 0.15), random_symmetric<Dim>(random, stress),
-          random(1e-3, 2e-3)};
+  return {x, random.vector<Dim>(2), Mat3::Identity() + random_matrix<Dim>(random, 0.15),
+          random_symmetric<Dim>(random, stress), random(1e-3, 2e-3)};
 }
 
 /// `count` random points between two corners given in cells.
 template <int Dim>
-Piece<Dim> random_piece(Random& random, const Lattice<Dim>& lattice, int count, const Vec<Dim>& from, const Vec<Dim>& to,
-                        int body = 0, int states = 0) {
+Piece<Dim> random_piece(Random& random, const Lattice<Dim>& lattice, int count, const Vec<Dim>& from,
+                        const Vec<Dim>& to, int body = 0, int states = 0) {
   Piece<Dim> piece(body, states);
   piece.points.resize(count);
   for (int p = 0; p < count; ++p) {
@@ -74,9 +74,12 @@ using Formula = std::function<Weight(int d, double x)>;
 
 inline Formula formula_of(ShapeFunction shape, const std::array<double, 3>& half) {
   switch (shape) {
-    case ShapeFunction::linear: return [](int, double x) { return hat(x); };
-    case ShapeFunction::bspline2: return [](int, double x) { return spline(x); };
-    case ShapeFunction::gimp: break;
+    case ShapeFunction::linear:
+      return [](int, double x) { return hat(x); };
+    case ShapeFunction::bspline2:
+      return [](int, double x) { return spline(x); };
+    case ShapeFunction::gimp:
+      break;
   }
   return [half](int d, double x) { return gimp(x, half[d]); };
 }

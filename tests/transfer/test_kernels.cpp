@@ -90,7 +90,8 @@ void for_shapes(F&& check) {
 template <int Dim>
 void check_projection(ShapeFunction kind, NormalSource source) {
   using N = NodeSums<Dim>;
-  SCOPED_TRACE(testing::Message() << Dim << "D, shape " << static_cast<int>(kind) << ", normals " << static_cast<int>(source));
+  SCOPED_TRACE(testing::Message() << Dim << "D, shape " << static_cast<int>(kind) << ", normals "
+                                  << static_cast<int>(source));
   PieceSetup<Dim> s(kind, source, true);
   project(s.piece, s.lattice, s.settings, density);
   const auto naive = s.naive();
@@ -104,11 +105,15 @@ void check_projection(ShapeFunction kind, NormalSource source) {
   EXPECT_LE(relative_difference(nodal_force(nodes, s.box), naive.force), round_off);
 
   using E = NodeExtras<Dim>;
-  const auto extras = [&](int first, int rows) { return nodal(nodes, &NodeBox<Dim>::extras, E::width, first, rows, s.box); };
+  const auto extras = [&](int first, int rows) {
+    return nodal(nodes, &NodeBox<Dim>::extras, E::width, first, rows, s.box);
+  };
   EXPECT_LE(relative_difference(extras(E::position, Dim), naive.position), round_off);
-  const std::vector<int> components = Dim == 2 ? std::vector{0, 4, 1} : std::vector{0, 4, 8, 1, 5, 2};  // in a 3x3 matrix
+  const std::vector<int> components =
+      Dim == 2 ? std::vector{0, 4, 1} : std::vector{0, 4, 8, 1, 5, 2};  // in a 3x3 matrix
   for (std::size_t i = 0; i < components.size(); ++i)
-    EXPECT_LE(relative_difference(extras(E::stress + static_cast<int>(i), 1), naive.stress.row(components[i])), round_off);
+    EXPECT_LE(relative_difference(extras(E::stress + static_cast<int>(i), 1), naive.stress.row(components[i])),
+              round_off);
 }
 TEST(Project, MatchesLoopsOverAllPointsAndNodes) {
   for (ShapeFunction kind : {ShapeFunction::linear, ShapeFunction::gimp, ShapeFunction::bspline2})
@@ -205,8 +210,10 @@ void check_stress(PieceSetup<Dim>& s, bool with_force) {
     expected.push_back(at);
   }
   SpeedLimits speeds;
-  if (with_force) update_stress_and_force(s.piece, s.lattice, s.settings, law, density, dt, speeds);
-  else update_stress(s.piece, s.lattice, s.settings, law, density, dt, speeds);
+  if (with_force)
+    update_stress_and_force(s.piece, s.lattice, s.settings, law, density, dt, speeds);
+  else
+    update_stress(s.piece, s.lattice, s.settings, law, density, dt, speeds);
   EXPECT_NEAR(speeds.wave, fastest, round_off * fastest);
   for (int p = 0; p < point_count; ++p) {
     const auto at = get_point(s.piece.points, p);
@@ -338,7 +345,8 @@ void check_integration(PieceSetup<Dim>& s) {
       const double p = nodes.sums[i * N::width + N::momentum + d], f = nodes.force[i * vector_width + d];
       const double a = mass > 0 ? f / mass : 0, v = mass > 0 ? p / mass : 0;
       EXPECT_NEAR(nodes.motion[i * NodeMotion<Dim>::width + d], a, round_off * std::abs(a));
-      EXPECT_NEAR(nodes.motion[i * NodeMotion<Dim>::width + Dim + d], v + dt * a, round_off * (std::abs(v) + dt * std::abs(a)));
+      EXPECT_NEAR(nodes.motion[i * NodeMotion<Dim>::width + Dim + d], v + dt * a,
+                  round_off * (std::abs(v) + dt * std::abs(a)));
       EXPECT_NEAR(from_sums[i * vector_width + d], v, round_off * std::abs(v));
       EXPECT_EQ(from_motion[i * vector_width + d], nodes.motion[i * NodeMotion<Dim>::width + Dim + d]);
     }

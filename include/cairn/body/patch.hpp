@@ -35,6 +35,7 @@ struct Patch {
   int links_before = 0;            // links whose contributions come before the patch's own
   std::vector<Piece<Dim>> pieces;  // ascending in body; those without points are ghosts
   PatchLedger ledger;
+  double seconds = 0;              // processor time spent on it since the last balance; steers nothing but balance
   std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
 
   Patch(int id_, const Lattice<Dim>& lattice) : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {

@@ -20,6 +20,12 @@ enum class FaceType { free, fixed, symmetry, wall, periodic };
 /// How patches are dealt to ranks; never changes a result.
 enum class Partition { metis, round_robin };
 
+struct ParallelOptions {
+  Partition partition = Partition::metis;
+  int balance_every = 200;      // steps between looks at the balance; 0: never
+  double imbalance = 1.1;       // largest over mean work of the ranks from which patches are dealt out anew
+};
+
 struct SolverOptions {
   ShapeFunction shape = ShapeFunction::gimp;
   StressUpdate stress_update = StressUpdate::both;

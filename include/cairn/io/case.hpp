@@ -90,7 +90,7 @@ struct Case {
   std::vector<Drive> drives;
   std::array<Face, 6> faces;
   Output output;
-  Partition partition = Partition::metis;  // [parallel] partition
+  ParallelOptions parallel;
   std::vector<std::string> warnings;
   std::string resolved;  // the text of case.toml: every default and override filled in
 };

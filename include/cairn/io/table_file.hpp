@@ -69,12 +69,19 @@ class TableReader {
   double time() const;  // [s]
   std::int64_t step() const;
   const std::string& kind() const;
+  /// Rows of one column, where columns differ in that; -1 if there is no such column.
+  std::int64_t rows_of(const std::string& column) const;
+  /// A number at the root; false if there is none of this name.
+  bool attribute(const std::string& name, double& value) const;
+  bool attribute(const std::string& name, std::int64_t& value) const;
 
-  /// Fills `values` (local_rows x components) with this rank's rows; ranks may ask for the same rows. Collective.
+  /// Fills `values` (local_rows x components) with this rank's rows of a column of rows.total_rows; ranks may ask for
+  /// the same rows. Collective.
   /// \throws InputError (on every rank) if there is no such column of that shape, RunError if reading fails.
   void read(const std::string& column, int components, const RowBlocks& rows, std::span<double> values) const;
   void read(const std::string& column, int components, const RowBlocks& rows, std::span<std::int32_t> values) const;
   void read(const std::string& column, int components, const RowBlocks& rows, std::span<std::int64_t> values) const;
+  void read(const std::string& column, int components, const RowBlocks& rows, std::span<std::uint8_t> values) const;
 
  private:
   struct State;
@@ -92,11 +99,17 @@ class SeriesIndex {
   /// \throws RunError (on every rank) if that fails.
   void add(const std::string& name, double time, MPI_Comm comm);
 
- private:
   struct Entry {
     std::string name;
     double time;  // [s]
   };
+  const std::vector<Entry>& entries() const { return entries_; }
+  /// Goes on from these entries, and writes the index if there are any. Collective; throws as add().
+  void restore(std::vector<Entry> entries, MPI_Comm comm);
+
+ private:
+  void write(MPI_Comm comm) const;
+
   std::filesystem::path file_;
   std::vector<Entry> entries_;
 };

@@ -82,10 +82,23 @@ class Simulation {
   void move_points();
   void migrate_points();                 // (*)
 
+  void connect_patches();                // after patches came or went
+  void balance();                        // (*)
+
+  /// Calls f(position, patch) for every patch and notes the processor time that it takes.
+  template <class F>
+  void for_patches(F&& f) {
+    for (std::size_t p = 0; p < patches_.size(); ++p) {
+      const double start = processor_seconds();
+      f(p, patches_[p]);
+      patches_[p].seconds += processor_seconds() - start;
+    }
+  }
   template <class F>
   void for_pieces(F&& f) {
-    for (auto& patch : patches_)
+    for_patches([&](std::size_t, Patch<Dim>& patch) {
       for (auto& piece : patch.pieces) f(piece);
+    });
   }
   void move_rigid(Piece<Dim>& piece);
   void start_speed_reduction();
@@ -94,6 +107,7 @@ class Simulation {
   MPI_Comm comm_;
   int rank_ = 0, ranks_ = 1;
   SolverOptions solver_;
+  ParallelOptions parallel_;
   Time limits_;
   Lattice<Dim> lattice_;
   TransferSettings<Dim> transfer_;

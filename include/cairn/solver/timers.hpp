@@ -3,8 +3,16 @@
 
 #include <array>
 #include <chrono>
+#include <ctime>
 
 namespace cairn {
+
+/// Processor time of this thread so far [s]: unlike wall time, not what other processes took.
+inline double processor_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 enum class Stage { project, exchange, contact, stress, integrate, update, migrate, output, count };
 inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::count)> stage_names = {

@@ -1,0 +1,118 @@
+#include "cairn/io/case_changes.hpp"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <sstream>
+#include <string_view>
+#include <toml++/toml.h>
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/checksum.hpp"
+
+namespace cairn {
+
+namespace {
+
+using Values = std::map<std::string, std::string>;
+
+std::string text_of(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) return fmt::format("{}", number->get());
+  if (const auto* array = node.as_array()) {
+    std::string text;
+    for (const auto& entry : *array) text += (text.empty() ? "" : ", ") + text_of(entry);
+    return "[" + text + "]";
+  }
+  std::ostringstream stream;
+  node.visit([&](const auto& value) { stream << toml::toml_formatter{value}; });
+  return stream.str();
+}
+
+/// Lists the plain values below a node by their dotted paths.
+void flatten(const toml::node& node, const std::string& path, Values& values) {
+  const auto inner = [&](const auto& part) { return path.empty() ? fmt::format("{}", part) : fmt::format("{}.{}", path, part); };
+  if (const auto* table = node.as_table()) {
+    for (const auto& [key, value] : *table) flatten(value, inner(key.str()), values);
+  } else if (const auto* array = node.as_array(); array && array->is_array_of_tables()) {
+    for (std::size_t i = 0; i < array->size(); ++i) flatten(*array->get(i), inner(i), values);
+  } else {
+    values[path] = text_of(node);
+  }
+}
+
+Values values_of(const std::string& text) {
+  try {
+    Values values;
+    flatten(toml::parse(text), "", values);
+    return values;
+  } catch (const toml::parse_error& error) {
+    throw InputError(fmt::format("the case in a checkpoint is no TOML: {}", error.description()));
+  }
+}
+
+/// Adds every number of a shape.
+struct ShapeSum {
+  Checksum& sum;
+  void add(double value) const { sum.add_values(std::span<const double>(&value, 1)); }
+  void add(const Vec3& v) const { sum.add_values(std::span<const double>(v.data(), 3)); }
+  void operator()(const Ball& s) const { add(s.centre), add(s.radius); }
+  void operator()(const BoxShape& s) const { add(s.lower), add(s.upper), add(s.angle); }
+  void operator()(const Ellipsoid& s) const { add(s.centre), add(s.radii), add(s.angle); }
+  void operator()(const Polygon& s) const {
+    for (const Vec3& p : s.points) add(p);
+  }
+  void operator()(const Cylinder& s) const { add(s.from), add(s.to), add(s.radius); }
+  void operator()(const HalfSpace& s) const { add(s.point), add(s.normal); }
+  void operator()(const Compound& s) const {
+    add(static_cast<double>(s.operation)), add(static_cast<double>(s.of.size()));
+    for (const Shape& part : s.of) all(part);
+  }
+  void all(const Shape& shape) const {
+    add(static_cast<double>(shape.index()));
+    std::visit(*this, shape);
+  }
+};
+
+}  // namespace
+
+std::vector<KeyChange> case_changes(const std::string& before, const std::string& after) {
+  const Values a = values_of(before), b = values_of(after);
+  constexpr const char* none = "(none)";
+  std::vector<KeyChange> changes;
+  for (const auto& [key, value] : a) {
+    const auto other = b.find(key);
+    if (other == b.end() || other->second != value) changes.push_back({key, value, other == b.end() ? none : other->second});
+  }
+  for (const auto& [key, value] : b)
+    if (!a.contains(key)) changes.push_back({key, none, value});
+  std::ranges::sort(changes, {}, &KeyChange::key);
+  return changes;
+}
+
+Freedom freedom_of(const std::string& key) {
+  const auto starts = [&](std::string_view start) { return key.starts_with(start); };
+  for (const char* fixed : {"domain.dimension", "domain.lower", "domain.upper", "domain.cells", "domain.periodic",
+                            "domain.patch_cells"})
+    if (key == fixed) return Freedom::fixed;
+  for (const char* free : {"title", "time.end", "time.steps", "time.wall_limit", "solver.energy_limit"})
+    if (key == free) return Freedom::free;
+  if (starts("output.") || starts("parallel.")) return Freedom::free;
+  // A table may have moved: whether its content is the same, bodies_checksum says.
+  if (starts("grains.") && key.ends_with(".file")) return Freedom::free;
+  return Freedom::on_demand;
+}
+
+std::uint64_t bodies_checksum(const Case& c) {
+  Checksum sum;
+  const ShapeSum add{sum};
+  for (const auto& body : c.bodies) {
+    add.all(body.shape);
+    add.add(static_cast<double>(body.material));
+    add.add(body.velocity), add.add(body.angular_velocity);
+    add.add(static_cast<double>(body.group.size()));
+    sum.add_values(std::span(body.group.data(), body.group.size()));
+  }
+  return sum.value();
+}
+
+}  // namespace cairn

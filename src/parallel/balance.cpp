@@ -1,0 +1,131 @@
+#include "cairn/parallel/balance.hpp"
+
+#include "cairn/parallel/communicator.hpp"
+
+#include <algorithm>
+#include <bit>
+
+namespace cairn {
+namespace {
+
+constexpr int move_tag = 12;
+
+template <int Dim>
+void put_piece(const Piece<Dim>& piece, Message& message) {
+  const Points<Dim>& points = piece.points;
+  for (std::int64_t value : {piece.body, points.size(), points.columns()}) message.put(value);
+  for (int c = 0; c < points.columns(); ++c) std::copy_n(points.column(c), points.size(), message.extend(points.size()));
+  for (auto id : points.ids()) message.put(id);
+  for (const auto& image : points.images()) message.put(std::bit_cast<std::int64_t>(image));
+}
+
+/// Pieces with points only: ghosts come back with the next exchange.
+template <int Dim>
+void put_patch(const Patch<Dim>& patch, Message& message) {
+  message.put(std::int64_t{patch.id});
+  message.put(patch.ledger.contact_dissipation);
+  message.put(patch.ledger.boundary_work);
+  message.put(patch.ledger.contact_nodes);
+  message.put(static_cast<std::int64_t>(patch.contacts.size()));
+  for (const auto& [pair, sum] : patch.contacts) {
+    message.put(std::int64_t{pair.first}), message.put(std::int64_t{pair.second});
+    for (double value : sum.values) message.put(value);
+  }
+  message.put(static_cast<std::int64_t>(
+      std::count_if(patch.pieces.begin(), patch.pieces.end(), [](const auto& piece) { return piece.points.size() > 0; })));
+  for (const auto& piece : patch.pieces)
+    if (piece.points.size() > 0) put_piece(piece, message);
+}
+
+template <int Dim>
+Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim>& lattice) {
+  Patch<Dim> patch(static_cast<int>(message.integer(at++)), lattice);
+  patch.ledger.contact_dissipation = *message.data(at++);
+  patch.ledger.boundary_work = *message.data(at++);
+  patch.ledger.contact_nodes = message.integer(at++);
+  for (std::int64_t n = message.integer(at++); n > 0; --n) {
+    const int a = static_cast<int>(message.integer(at++)), b = static_cast<int>(message.integer(at++));
+    auto& sum = patch.contacts[{a, b}];
+    for (double& value : sum.values) value = *message.data(at++);
+  }
+  for (std::int64_t n = message.integer(at++); n > 0; --n) {
+    const int body = static_cast<int>(message.integer(at++)), count = static_cast<int>(message.integer(at++));
+    const int columns = static_cast<int>(message.integer(at++));
+    auto& points = patch.piece_of(body, columns - PointColumns<Dim>::state).points;
+    points.resize(count);
+    for (int c = 0; c < columns; ++c, at += count) std::copy_n(message.data(at), count, points.column(c));
+    for (auto& id : points.ids()) id = message.integer(at++);
+    for (auto& image : points.images()) image = std::bit_cast<Image>(message.integer(at++));
+  }
+  return patch;
+}
+
+}  // namespace
+
+double imbalance_of(const std::vector<std::int64_t>& work, const std::vector<int>& owner, int ranks) {
+  std::vector<double> load(ranks, 0);
+  double total = 0;
+  for (std::size_t p = 0; p < work.size(); ++p) load[owner[p]] += work[p], total += work[p];
+  return total > 0 ? *std::max_element(load.begin(), load.end()) * ranks / total : 1.0;
+}
+
+std::vector<int> keep_in_place(const std::vector<int>& parts, const std::vector<int>& owner,
+                               const std::vector<std::int64_t>& work, int ranks) {
+  struct Overlap {
+    std::int64_t work;
+    int part, rank;
+  };
+  std::vector<Overlap> overlaps(static_cast<std::size_t>(ranks) * ranks);
+  for (int a = 0; a < ranks; ++a)
+    for (int b = 0; b < ranks; ++b) overlaps[static_cast<std::size_t>(a) * ranks + b] = {0, a, b};
+  for (std::size_t p = 0; p < parts.size(); ++p)
+    overlaps[static_cast<std::size_t>(parts[p]) * ranks + owner[p]].work += 1 + work[p];
+  std::stable_sort(overlaps.begin(), overlaps.end(), [](const Overlap& a, const Overlap& b) { return a.work > b.work; });
+  std::vector<int> rank_of(ranks, -1);
+  std::vector<bool> taken(ranks, false);
+  for (const auto& o : overlaps)
+    if (rank_of[o.part] < 0 && !taken[o.rank]) rank_of[o.part] = o.rank, taken[o.rank] = true;
+  std::vector<int> renamed(parts.size());
+  for (std::size_t p = 0; p < parts.size(); ++p) renamed[p] = rank_of[parts[p]];
+  return renamed;
+}
+
+template <int Dim>
+void move_patches(std::vector<Patch<Dim>>& patches, std::vector<int>& owner, const std::vector<int>& new_owner,
+                  const Lattice<Dim>& lattice, MPI_Comm comm) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  std::vector<Message> outgoing(ranks);
+  for (const auto& patch : patches)
+    if (new_owner[patch.id] != rank) put_patch(patch, outgoing[new_owner[patch.id]]);
+  std::erase_if(patches, [&](const auto& patch) { return new_owner[patch.id] != rank; });
+
+  // Every rank knows from the two tables whom it will hear from.
+  std::vector<bool> hears_from(ranks, false);
+  for (std::size_t p = 0; p < owner.size(); ++p)
+    if (new_owner[p] == rank && owner[p] != rank) hears_from[owner[p]] = true;
+  std::vector<MPI_Request> requests;
+  for (int r = 0; r < ranks; ++r)
+    if (outgoing[r].size() > 0)
+      MPI_Isend(outgoing[r].data(0), static_cast<int>(outgoing[r].size()), MPI_DOUBLE, r, move_tag, comm,
+                &requests.emplace_back());
+  for (int r = 0; r < ranks; ++r) {
+    if (!hears_from[r]) continue;
+    MPI_Status status;
+    int count = 0;
+    MPI_Probe(r, move_tag, comm, &status);
+    MPI_Get_count(&status, MPI_DOUBLE, &count);
+    Message message;
+    MPI_Recv(message.extend(count), count, MPI_DOUBLE, r, move_tag, comm, MPI_STATUS_IGNORE);
+    for (std::size_t at = 0; at < message.size();) patches.push_back(take_patch(message, at, lattice));
+  }
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+  std::sort(patches.begin(), patches.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
+  owner = new_owner;
+}
+
+template void move_patches(std::vector<Patch<2>>&, std::vector<int>&, const std::vector<int>&, const Lattice<2>&, MPI_Comm);
+template void move_patches(std::vector<Patch<3>>&, std::vector<int>&, const std::vector<int>&, const Lattice<3>&, MPI_Comm);
+
+}  // namespace cairn
