@@ -3,9 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
 #include <string_view>
 
 #include "cairn/core/error.hpp"
+#include "table_writer.hpp"
 
 namespace cairn {
 namespace {
@@ -30,6 +36,51 @@ bool is_result_name(const std::string& name) {
     return name.size() > n.start.size() + n.ending.size() && name.starts_with(n.start) && name.ends_with(n.ending) &&
            is_number(std::string_view(name).substr(n.start.size(), name.size() - n.start.size() - n.ending.size()));
   });
+}
+
+std::vector<NumberedFile> numbered_files(const fs::path& folder, const std::string& kind) {
+  std::vector<NumberedFile> found;
+  const std::string start = kind + "_";
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (!name.starts_with(start) || !is_result_name(name) || name.size() > start.size() + 24) continue;
+    found.push_back({std::strtoll(name.c_str() + start.size(), nullptr, 10), entry->path()});
+  }
+  std::ranges::sort(found, {}, &NumberedFile::number);
+  return found;
+}
+
+std::string numbered_name(const std::string& kind, std::int64_t number) {
+  for (const auto& n : numbered)
+    if (n.start == kind + "_") return fmt::format("{}{:06}{}", n.start, number, n.ending);
+  throw std::logic_error("no numbered files of kind " + kind);
+}
+
+void remove_leftovers(const fs::path& folder) {
+  constexpr std::string_view ending = ".part";
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with('.') && name.ends_with(ending) &&
+        is_result_name(name.substr(1, name.size() - 1 - ending.size())))
+      found.push_back(entry->path());
+  }
+  for (const auto& file : found) fs::remove(file, error);
+}
+
+std::string replace_file(const fs::path& file, const std::string& text) {
+  const fs::path temporary = temporary_name(file);
+  errno = 0;
+  std::FILE* stream = std::fopen(temporary.c_str(), "w");
+  if (stream == nullptr) return write_failure(file, "creating the file", std::strerror(errno));
+  const bool written = std::fwrite(text.data(), 1, text.size(), stream) == text.size();
+  const bool closed = std::fclose(stream) == 0;
+  std::string error = written && closed ? "" : write_failure(file, "writing", std::strerror(errno));
+  if (error.empty()) error = publish(temporary, file);
+  if (!error.empty()) std::remove(temporary.c_str());
+  return error;
 }
 
 std::vector<fs::path> find_results(const fs::path& folder) {

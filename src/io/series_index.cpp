@@ -1,12 +1,8 @@
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-
 #include "cairn/io/agreement.hpp"
+#include "cairn/io/result_files.hpp"
 #include "cairn/io/table_file.hpp"
-#include "table_writer.hpp"
 
 namespace cairn {
 
@@ -19,20 +15,6 @@ std::string quoted(const std::string& text) {
     result += c;
   }
   return result + '"';
-}
-
-/// Writes the whole text under a temporary name and renames it; returns the error, empty if none.
-std::string replace_text(const std::filesystem::path& file, const std::string& text) {
-  const std::filesystem::path temporary = temporary_name(file);
-  errno = 0;
-  std::FILE* stream = std::fopen(temporary.c_str(), "w");
-  if (stream == nullptr) return write_failure(file, "creating the file", std::strerror(errno));
-  const bool written = std::fwrite(text.data(), 1, text.size(), stream) == text.size();
-  const bool closed = std::fclose(stream) == 0;
-  std::string error = written && closed ? "" : write_failure(file, "writing", std::strerror(errno));
-  if (error.empty()) error = publish(temporary, file);
-  if (!error.empty()) std::remove(temporary.c_str());
-  return error;
 }
 
 }  // namespace
@@ -56,7 +38,7 @@ void SeriesIndex::write(MPI_Comm comm) const {
     for (const auto& entry : entries_)
       text += fmt::format("    {{\"name\": {}, \"time\": {}}}{}\n", quoted(entry.name), entry.time,
                           &entry == &entries_.back() ? "" : ",");
-    error = replace_text(file_, text + "  ]\n}\n");
+    error = replace_file(file_, text + "  ]\n}\n");
   }
   throw_together(comm, error);
 }

@@ -1,6 +1,7 @@
 #pragma once
 /// The files in which a run leaves its results, so that none are overwritten unasked.
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -17,5 +18,23 @@ std::vector<std::filesystem::path> find_results(const std::filesystem::path& fol
 
 /// Removes exactly the result files in `folder`; returns the first error, empty if there was none. Not collective.
 std::string remove_results(const std::filesystem::path& folder);
+
+struct NumberedFile {
+  std::int64_t number;
+  std::filesystem::path file;
+};
+
+/// The result files KIND_N of a folder, ascending in N; KIND is particles, grains, contacts or checkpoint. Not collective.
+std::vector<NumberedFile> numbered_files(const std::filesystem::path& folder, const std::string& kind);
+
+/// KIND_N with at least six digits and the ending of its kind.
+std::string numbered_name(const std::string& kind, std::int64_t number);
+
+/// Removes what a program that was killed left under temporary names. Not collective.
+void remove_leftovers(const std::filesystem::path& folder);
+
+/// Gives a file this text, all of it or none: it is written under a temporary name, flushed to disk and renamed.
+/// Returns the error, empty if none. Not collective.
+std::string replace_file(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace cairn

@@ -1,7 +1,7 @@
 #pragma once
 /// A whole run of a case: set-up or restart, stepping, output.
 
-#include <mpi.h>
+#include "cairn/parallel/communicator.hpp"
 
 #include <filesystem>
 #include <string>
