@@ -193,6 +193,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
   contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, types);
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   bodies_ = make_bodies(c, materials_);
+  if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
 
   // Each rank counts the points of some patches; then every rank knows all counts and deals the patches out alike.
   const Filler<Dim> filler(c, lattice_, bodies_, materials_);

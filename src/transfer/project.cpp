@@ -46,7 +46,12 @@ void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
                                                        : determinant(load_deformation(piece.points, first))));
       for (int lane = 0; lane < count; ++lane)
         stencil.for_nodes(lane, [&](int node, double /*w*/, const double(&g)[Dim]) {
-          for (int d = 0; d < Dim; ++d) sums[node * N::width + N::gradient + d] += share[lane] * g[d];
+          // The upper half of a node's row holds the gradient (and in 3D, before it, the volume).
+          static_assert(N::gradient >= 4 && N::gradient + Dim <= N::width);
+          Lanes4 slope{};
+          for (int d = 0; d < Dim; ++d) slope[N::gradient - 4 + d] = g[d];
+          double* upper = sums + node * N::width + 4;
+          store4(upper, load4(upper) + slope * share[lane]);
         });
     });
   });
