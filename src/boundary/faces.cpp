@@ -46,7 +46,7 @@ void mirror(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions
         inside[d] += inwards, outside[d] -= inwards;
         if (!box.contains(outside)) return;
         double* out = array.data() + static_cast<std::size_t>(box.offset(outside)) * width;
-        if (!box.contains(inside)) return std::fill_n(out, width, 0.0), void();
+        if (!box.contains(inside)) return;  // nothing inside: what lies beyond is its own image's image
         double* in = array.data() + static_cast<std::size_t>(box.offset(inside)) * width;
         for (int c = 0; c < width; ++c) in[c] += odd[c] ? -out[c] : out[c], out[c] = odd[c] ? -in[c] : in[c];
       });

@@ -8,7 +8,7 @@ from pathlib import Path
 from harness import ROOT, Program, sets
 
 NO_PARTICLES = {"output.particles": "{}"}
-LIMIT = 580  # seconds for one run
+LIMIT = 580  # for one run [s]
 
 
 @dataclasses.dataclass
@@ -56,9 +56,11 @@ def report(checks: list[Check]) -> int:
     return 1 if failed or not checks else 0
 
 
-def run_case(program: Program, case: str, out: Path, settings: dict, ranks: int = 1) -> Path:
-    """Runs cases/CASE.toml with the settings into a folder, which it returns."""
-    done = program("run", ROOT / "cases" / f"{case}.toml", "--out", out, *sets(settings), ranks=ranks, timeout=LIMIT)
+def run_case(program: Program, case: str | Path, out: Path, settings: dict, ranks: int = 1,
+             timeout: float = LIMIT) -> Path:
+    """Runs cases/CASE.toml, or a file, with the settings into a folder, which it returns."""
+    file = case if isinstance(case, Path) else ROOT / "cases" / f"{case}.toml"
+    done = program("run", file, "--out", out, *sets(settings), ranks=ranks, timeout=timeout)
     if done.code != 0:
         raise RuntimeError(f"{out.name}: exit code {done.code}\n{done.err or done.out[-500:]}")
     return out

@@ -216,8 +216,9 @@ double spin_loss(int cells) {
   add_body(c, Ball{Vec3(0.513, 0.487, 0), 0.3}, Vec3::Zero(), Vec3(0, 0, 0.6));
   Simulation<2> simulation(c, MPI_COMM_WORLD);
   const double start = angular_momentum(simulation), turn = 2 * std::numbers::pi / 0.6;
+  const Totals totals = simulation.totals();
   while (simulation.time() < turn) simulation.step(turn - simulation.time());
-  EXPECT_LE(simulation.totals().momentum.norm(), simulation.totals().mass * 1e-12);
+  EXPECT_LE((simulation.totals().momentum - totals.momentum).norm(), 1e-12 * totals.mass);
   return 1 - angular_momentum(simulation) / start;
 }
 
@@ -237,7 +238,9 @@ void check_driven() {
   const Vec3 centre(0.45, 0.5, Dim == 3 ? 0.5 : 0), velocity(0.9, 0.05, 0);
   const Vec3 spin = Dim == 3 ? Vec3(1.1, -0.7, 2.3) : Vec3(0, 0, 2.3);
   add_body(c, BoxShape{centre - Vec3(0.12, 0.2, 0.15), centre + Vec3(0.12, 0.2, 0.15), 0.3});
-  c.drives.push_back({-1, {0}, "", velocity, spin});
+  Drive drive;
+  drive.ids = {0}, drive.velocity = velocity, drive.angular_velocity = spin;
+  c.drives.push_back(drive);
   Simulation<Dim> simulation(c, MPI_COMM_WORLD);
   const auto start = points_of(simulation);
   for (int i = 0; i < 100; ++i) simulation.step(forever);

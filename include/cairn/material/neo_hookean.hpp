@@ -19,7 +19,8 @@ struct NeoHookean {
   explicit NeoHookean(const ParameterValues& values) : moduli(values) {}
 
   /// New stress [Pa] from the new deformation gradient `F` with determinant `J`.
-  /// Returns the longitudinal modulus over the current density relative to the reference density [Pa].
+  /// Returns the longitudinal modulus times the reference density over the current one [Pa], for the time step: exact for
+  /// pure changes of volume, within some per cent for large distortion.
   template <int Dim, class T>
   T update(const Tensor<Dim, T>& /*A*/, const Tensor<Dim, T>& F, T J, Symmetric<Dim, T>& stress, T* /*state*/) const {
     const T inverse = 1.0 / J, root = inverse_cube_root(J);

@@ -40,7 +40,8 @@ struct VonMises {
     stress = scale_and_shift(deviator, scale, mean);
     state[0] += strain;
     state[1] += 0.5 * J * (contraction(old, D) + contraction(stress, D));
-    state[2] += J * strain * (yield_stress + hardening_modulus * state[0]);
+    // The mean of the old and new yield stress: exact for radial loading.
+    state[2] += J * strain * (yield_stress + hardening_modulus * (state[0] - 0.5 * strain));
     return J * moduli.longitudinal();
   }
 
