@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 
 namespace cairn {
 
@@ -33,7 +35,21 @@ std::string format_progress(const Progress& p) {
       format_duration(p.wall_left));
 }
 
-ProgressDisplay::ProgressDisplay(std::FILE* stream) : ProgressDisplay(stream, ::isatty(::fileno(stream)) == 1) {}
+namespace {
+
+/// True where a person watches the stream. Under Open MPI rank 0 always writes to a terminal of mpirun's own making: what
+/// counts is where mpirun, the parent, writes to.
+bool is_watched(std::FILE* stream) {
+  if (::isatty(::fileno(stream)) != 1) return false;
+  if (std::getenv("OMPI_COMM_WORLD_SIZE") == nullptr) return true;
+  std::error_code unreadable;
+  const auto target = std::filesystem::read_symlink(fmt::format("/proc/{}/fd/1", ::getppid()), unreadable).string();
+  return target.starts_with("/dev/pts/") || target.starts_with("/dev/tty");
+}
+
+}  // namespace
+
+ProgressDisplay::ProgressDisplay(std::FILE* stream) : ProgressDisplay(stream, is_watched(stream)) {}
 
 void ProgressDisplay::show(const Progress& progress, double wall) {
   if (!due(wall)) return;
