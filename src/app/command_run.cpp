@@ -37,6 +37,25 @@ void check_free(const fs::path& out) {
                                results.size() > 1 ? fmt::format(" and {} more", results.size() - 1) : ""));
 }
 
+/// A word as a shell reads it back.
+std::string quoted(const std::string& word) {
+  constexpr std::string_view plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+./=:,@%";
+  if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+/// The command of this run without --restart, with a space at its end.
+std::string command_line(const RunArguments& arguments, const fs::path& out) {
+  int ranks = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  std::string text = ranks > 1 ? fmt::format("mpirun -n {} ", ranks) : "";
+  text += fmt::format("{} run {} --out {} ", quoted(arguments.program), quoted(arguments.file.string()), quoted(out.string()));
+  for (const auto& [key, value] : arguments.overrides) text += fmt::format("--set {} ", quoted(key + "=" + value));
+  return text;
+}
+
 }  // namespace
 
 int command_run(const RunArguments& arguments) {
@@ -44,8 +63,12 @@ int command_run(const RunArguments& arguments) {
   if (const int code = settle(attempt([&] { c = read_case(arguments.file, arguments.overrides); }))) return code;
   print_warnings(c.warnings);
 
-  RunSettings settings{arguments.out, arguments.restart, arguments.profile, arguments.overwrite};
-  if (settings.out.empty()) settings.out = arguments.file.stem();
+  RunSettings settings;
+  settings.out = arguments.out.empty() ? arguments.file.stem() : arguments.out;
+  settings.restart = arguments.restart;
+  settings.profile = arguments.profile, settings.overwrite = arguments.overwrite;
+  settings.allow_changes = arguments.allow_changes;
+  settings.command = command_line(arguments, settings.out);
   std::vector<fs::path> made;
   const auto prepare = [&] {
     if (settings.overwrite && !settings.restart.empty())

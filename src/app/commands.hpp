@@ -15,8 +15,9 @@ enum Exit { done = 0, wrong_input = 2, failed = 3, stopped = 4 };
 struct RunArguments {
   std::filesystem::path file, out;
   std::vector<Override> overrides;
+  std::string program;  // as it was called
   std::string restart;
-  bool profile = false, overwrite = false;
+  bool profile = false, overwrite = false, allow_changes = false;
 };
 
 struct PackArguments {

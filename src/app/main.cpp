@@ -45,6 +45,7 @@ void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
   add_sets(run, a);
   run->add_option("--restart", a.run.restart,
                   "go on from a checkpoint FILE, or from the 'latest' in the folder of the results");
+  run->add_flag("--allow-changes", a.run.allow_changes, "with --restart: go on although the case has changed");
   run->add_flag("--overwrite", a.run.overwrite, "remove the results that the folder already holds");
   run->add_flag("--profile", a.run.profile, "report where the time went");
   run->callback([&] {
@@ -74,6 +75,7 @@ void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
 int dispatch(int argc, char** argv) {
   CLI::App app("Cairn: Material Point Method for many bodies in frictional contact", "cairn");
   Arguments arguments;
+  arguments.run.program = argv[0];
   std::function<int()> command;
   define(app, arguments, command);
   try {

@@ -11,17 +11,22 @@ int whole_lanes(int n) { return (n + lane_count - 1) / lane_count * lane_count; 
 
 template <int Dim>
 void Points<Dim>::resize(int size) {
-  if (size > capacity_) {
-    const int capacity = whole_lanes(size_ == 0 ? size : size + size / 4);
-    AlignedDoubles grown(static_cast<std::size_t>(capacity) * columns_);
-    std::fill(grown.begin(), grown.end(), 0.0);
-    for (int c = 0; c < columns_; ++c) std::copy_n(column(c), size_, grown.data() + static_cast<std::size_t>(c) * capacity);
-    data_.swap(grown);
-    capacity_ = capacity;
-  }
+  if (size > capacity_) reallocate(size_ == 0 ? size : size + size / 8);
   size_ = size;
   ids_.resize(size);
   images_.resize(size);
+}
+
+template <int Dim>
+void Points<Dim>::reallocate(int capacity) {
+  capacity = whole_lanes(capacity);
+  AlignedDoubles moved(static_cast<std::size_t>(capacity) * columns_);
+  std::fill(moved.begin(), moved.end(), 0.0);
+  for (int c = 0; c < columns_; ++c) std::copy_n(column(c), size_, moved.data() + static_cast<std::size_t>(c) * capacity);
+  data_.swap(moved);
+  capacity_ = capacity;
+  ids_.reserve(capacity);
+  images_.reserve(capacity);
 }
 
 template <int Dim>

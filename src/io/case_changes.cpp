@@ -1,11 +1,11 @@
 #include "cairn/io/case_changes.hpp"
 
 #include <fmt/format.h>
+#include <toml++/toml.h>
 
 #include <map>
 #include <sstream>
 #include <string_view>
-#include <toml++/toml.h>
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/checksum.hpp"
@@ -30,7 +30,9 @@ std::string text_of(const toml::node& node) {
 
 /// Lists the plain values below a node by their dotted paths.
 void flatten(const toml::node& node, const std::string& path, Values& values) {
-  const auto inner = [&](const auto& part) { return path.empty() ? fmt::format("{}", part) : fmt::format("{}.{}", path, part); };
+  const auto inner = [&](const auto& part) {
+    return path.empty() ? fmt::format("{}", part) : fmt::format("{}.{}", path, part);
+  };
   if (const auto* table = node.as_table()) {
     for (const auto& [key, value] : *table) flatten(value, inner(key.str()), values);
   } else if (const auto* array = node.as_array(); array && array->is_array_of_tables()) {
@@ -81,7 +83,8 @@ std::vector<KeyChange> case_changes(const std::string& before, const std::string
   std::vector<KeyChange> changes;
   for (const auto& [key, value] : a) {
     const auto other = b.find(key);
-    if (other == b.end() || other->second != value) changes.push_back({key, value, other == b.end() ? none : other->second});
+    if (other == b.end() || other->second != value)
+      changes.push_back({key, value, other == b.end() ? none : other->second});
   }
   for (const auto& [key, value] : b)
     if (!a.contains(key)) changes.push_back({key, none, value});
@@ -91,9 +94,10 @@ std::vector<KeyChange> case_changes(const std::string& before, const std::string
 
 Freedom freedom_of(const std::string& key) {
   const auto starts = [&](std::string_view start) { return key.starts_with(start); };
-  for (const char* fixed : {"domain.dimension", "domain.lower", "domain.upper", "domain.cells", "domain.periodic",
-                            "domain.patch_cells"})
+  for (const char* fixed :
+       {"domain.dimension", "domain.lower", "domain.upper", "domain.cells", "domain.periodic", "domain.patch_cells"})
     if (key == fixed) return Freedom::fixed;
+  if (starts("materials.") && key.ends_with(".model")) return Freedom::fixed;  // the state variables are the model's
   for (const char* free : {"title", "time.end", "time.steps", "time.wall_limit", "solver.energy_limit"})
     if (key == free) return Freedom::free;
   if (starts("output.") || starts("parallel.")) return Freedom::free;

@@ -169,6 +169,7 @@ void read_time(Table time, Time& result) {
   if (time.has("steps")) result.steps = time.integer("steps", std::nullopt, 1, most_steps);
   result.cfl = time.number("cfl", 0.4, {0, 1, true});
   result.dt = time.has("dt") ? time.number("dt", std::nullopt, positive) : 0;
+  result.wall_limit = time.has("wall_limit") ? time.number("wall_limit", std::nullopt, positive) : 0;
   time.finish();
 }
 
@@ -184,6 +185,7 @@ void read_solver(Table solver, int dimension, SolverOptions& result) {
     solver.error("points_per_cell", fmt::format("{} is not a {}; choose one of {}", result.points_per_cell,
                                                 dimension == 2 ? "square number" : "cube number",
                                                 dimension == 2 ? "1, 4, 9, 16, 25, 36, 49, 64" : "1, 8, 27, 64, 125"));
+  result.energy_limit = solver.number("energy_limit", 0.0, not_negative);
   solver.finish();
 }
 

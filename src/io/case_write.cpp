@@ -123,11 +123,13 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   if (time.steps != Time{}.steps) out.key("steps", time.steps);
   out.key("cfl", time.cfl);
   if (time.dt > 0) out.key("dt", time.dt);
+  if (time.wall_limit > 0) out.key("wall_limit", time.wall_limit);
   out.section("[solver]");
   out.key("shape", name_of(shape_function_names, solver.shape));
   out.key("stress_update", name_of(stress_update_names, solver.stress_update));
   out.key("flip", solver.flip);
   out.key("points_per_cell", solver.points_per_cell);
+  out.key("energy_limit", solver.energy_limit);
 }
 
 void write_contact(Writer& out, const Case& c) {

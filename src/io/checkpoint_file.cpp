@@ -67,7 +67,8 @@ CheckpointReader::CheckpointReader(const std::filesystem::path& file, MPI_Comm c
 }
 
 void CheckpointReader::require(const std::string& problem) const {
-  const std::string message = common_error(comm_, problem.empty() ? "" : fmt::format("{}: {}", file_.string(), problem));
+  const std::string message =
+      common_error(comm_, problem.empty() ? "" : fmt::format("{}: {}", file_.string(), problem));
   if (!message.empty()) throw InputError(message);
 }
 

@@ -18,8 +18,8 @@ namespace {
 std::string header_of(const std::vector<std::string>& columns) { return fmt::format("{}\n", fmt::join(columns, ",")); }
 
 /// Adds the file's content up to a position to `sum`; returns what is wrong with it, empty if nothing is.
-std::string read_prefix(const std::filesystem::path& file, const std::vector<std::string>& columns, const CsvPosition& from,
-                        Checksum& sum) {
+std::string read_prefix(const std::filesystem::path& file, const std::vector<std::string>& columns,
+                        const CsvPosition& from, Checksum& sum) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) return fmt::format("{}: cannot be read", file.string());
   std::vector<char> buffer(std::size_t{1} << 20);
@@ -35,7 +35,8 @@ std::string read_prefix(const std::filesystem::path& file, const std::vector<std
     sum.add_values(std::span<const char>(buffer).first(static_cast<std::size_t>(got)));
     left -= got;
   }
-  if (sum.value() != from.checksum) return fmt::format("{}: is not as the run of the checkpoint left it", file.string());
+  if (sum.value() != from.checksum)
+    return fmt::format("{}: is not as the run of the checkpoint left it", file.string());
   return {};
 }
 

@@ -175,6 +175,28 @@ std::string format_table(const std::vector<std::array<std::string, 4>>& rows) {
   return text;
 }
 
+/// What a checkpoint holds besides its columns.
+std::string describe_checkpoint(hid_t root) {
+  const auto number = [&](const std::string& name) {
+    double value = 0;
+    hdf5::read_attribute(root, name, value);
+    return value;
+  };
+  const auto rows = [&](const char* name) {
+    const Handle dataset(H5Dopen2(root, name, H5P_DEFAULT), H5Dclose);
+    const Handle space(dataset.valid() ? H5Dget_space(dataset) : H5I_INVALID_HID, H5Sclose);
+    return space.valid() ? H5Sget_simple_extent_npoints(space) : 0;
+  };
+  std::string written;
+  for (const char* kind : {"history", "particles", "grains", "contacts", "checkpoint"})
+    written += fmt::format("{}{} {}", written.empty() ? "" : ", ", number(std::string(kind) + "_count"), kind);
+  return fmt::format("{} points in {} pieces of bodies in {} patches, {}D; last dt {} s, energy error {:.3g}\n"
+                     "outputs written so far: {}; history.csv was {} bytes long\n"
+                     "go on with: cairn run CASE.toml --out DIR --restart FILE\n",
+                     number("rows"), rows("piece_body"), rows("patch_points"), number("dimension"), number("dt"),
+                     number("energy_error"), written, number("history_bytes"));
+}
+
 /// The attributes of the root that a file of this program has, where it has them.
 std::string describe_header(const std::filesystem::path& file, hid_t root) {
   const bool vtk = H5Lexists(root, "VTKHDF", H5P_DEFAULT) > 0;
@@ -186,7 +208,8 @@ std::string describe_header(const std::filesystem::path& file, hid_t root) {
   if (hdf5::read_attribute(root, "time", time)) facts += fmt::format("time {} s", time);
   if (hdf5::read_attribute(root, "step", step)) facts += fmt::format("{}step {}", facts.empty() ? "" : ", ", step);
   if (hdf5::read_attribute(root, "rows", rows)) facts += fmt::format("{}{} rows", facts.empty() ? "" : ", ", rows);
-  return facts.empty() ? text : text + facts + "\n";
+  if (!facts.empty()) text += facts + "\n";
+  return kind == "checkpoint" ? text + describe_checkpoint(root) : text;
 }
 
 }  // namespace

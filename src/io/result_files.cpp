@@ -42,7 +42,8 @@ std::vector<NumberedFile> numbered_files(const fs::path& folder, const std::stri
   std::vector<NumberedFile> found;
   const std::string start = kind + "_";
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator(); entry.increment(error)) {
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (!name.starts_with(start) || !is_result_name(name) || name.size() > start.size() + 24) continue;
     found.push_back({std::strtoll(name.c_str() + start.size(), nullptr, 10), entry->path()});
@@ -61,7 +62,8 @@ void remove_leftovers(const fs::path& folder) {
   constexpr std::string_view ending = ".part";
   std::vector<fs::path> found;
   std::error_code error;
-  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator(); entry.increment(error)) {
+  for (fs::directory_iterator entry(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (name.starts_with('.') && name.ends_with(ending) &&
         is_result_name(name.substr(1, name.size() - 1 - ending.size())))

@@ -83,7 +83,8 @@ std::uint64_t checksum_of(const OpenFile& file, std::int64_t length, MPI_Comm co
     errno = 0;
     if (!file.read(buffer.data(), count, c * chunk_bytes))
       error = fmt::format("it cannot be read: {}", errno != 0 ? std::strerror(errno) : "it ends early");
-    sums[static_cast<std::size_t>(c)] = checksum(std::span<const std::byte>(buffer).first(static_cast<std::size_t>(count)));
+    sums[static_cast<std::size_t>(c)] =
+        checksum(std::span<const std::byte>(buffer).first(static_cast<std::size_t>(count)));
   }
   MPI_Allreduce(MPI_IN_PLACE, sums.data(), static_cast<int>(chunks), MPI_UINT64_T, MPI_SUM, comm);
   return checksum(std::span<const std::uint64_t>(sums));

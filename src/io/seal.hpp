@@ -1,6 +1,6 @@
 #pragma once
-/// The seal of a file: its length and checksum in 40 bytes after its end, where HDF5 does not look. It is checked before
-/// HDF5 opens the file, because damaged structures can make that library crash or loop.
+/// The seal of a file: its length and checksum in 40 bytes after its end, where HDF5 does not look. It is checked
+/// before HDF5 opens the file, because damaged structures can make that library crash or loop.
 
 #include <mpi.h>
 

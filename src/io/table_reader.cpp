@@ -49,14 +49,17 @@ void TableReader::State::read(const std::string& column, int components, const R
   require_input(check_rows(wanted, components, values.size()));
   const bool exists = H5Lexists(handle, column.c_str(), H5P_DEFAULT) > 0;
   const Handle dataset(exists ? H5Dopen2(handle, column.c_str(), H5P_DEFAULT) : H5I_INVALID_HID, H5Dclose);
-  require_input(dataset.valid() ? check_shape(dataset, column, wanted.total_rows, components) : "it has no column " + column);
+  require_input(dataset.valid() ? check_shape(dataset, column, wanted.total_rows, components)
+                                : "it has no column " + column);
 
   errno = 0;
   const Handle in_memory = memory_space(wanted.local_rows(), components), in_file = select_rows(wanted, components);
   const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose);
   const bool ready = in_memory.valid() && in_file.valid() && H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE) >= 0;
   throw_together(comm, ready ? "" : fmt::format("cannot read {}: {}", file.string(), hdf5::error_text()));
-  const bool good = H5Dread(dataset, hdf5::native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0;
+  // A dataset without rows has no place in the file, and HDF5 fails to read nothing from there.
+  const bool good = wanted.total_rows == 0 ||
+                    H5Dread(dataset, hdf5::native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0;
   throw_together(comm,
                  good ? "" : fmt::format("cannot read {}: column {}: {}", file.string(), column, hdf5::error_text()));
 }
@@ -92,7 +95,8 @@ std::int64_t TableReader::rows_of(const std::string& column) const {
   const Handle dataset(H5Dopen2(state_->handle, column.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle space(dataset.valid() ? H5Dget_space(dataset) : H5I_INVALID_HID, H5Sclose);
   hsize_t extent[H5S_MAX_RANK] = {0};
-  return space.valid() && H5Sget_simple_extent_dims(space, extent, nullptr) >= 1 ? static_cast<std::int64_t>(extent[0]) : -1;
+  return space.valid() && H5Sget_simple_extent_dims(space, extent, nullptr) >= 1 ? static_cast<std::int64_t>(extent[0])
+                                                                                 : -1;
 }
 
 bool TableReader::attribute(const std::string& name, double& value) const {

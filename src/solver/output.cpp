@@ -109,6 +109,7 @@ class PointTable {
   template <class F>
   void add_columns(const std::string& name, int components, F&& value) {
     auto& out = columns_.add_doubles(name, components);
+    out.reserve(count() * components);
     for_pieces([&](const Piece<Dim>& piece) {
       for (int p = 0; p < piece.points.size(); ++p)
         for (int c = 0; c < components; ++c) out.push_back(value(piece.points, p, c));
@@ -117,10 +118,16 @@ class PointTable {
   template <class F>
   void add_piecewise(const std::string& name, F&& values) {
     auto& out = columns_.add_doubles(name, 1);
+    out.reserve(count());
     for_pieces([&](const Piece<Dim>& piece) {
       const std::vector<double> v = values(piece, simulation_.material_of(piece).density);
       out.insert(out.end(), v.begin(), v.end());
     });
+  }
+  std::size_t count() const {
+    std::size_t n = 0;
+    for (const auto& patch : simulation_.patches()) n += static_cast<std::size_t>(patch.point_count());
+    return n;
   }
   static std::vector<double> volumes(const Points<Dim>& points) {
     std::vector<double> v(points.size());
@@ -133,14 +140,17 @@ class PointTable {
   }
   void add_body() {
     auto& out = columns_.add_ints("body", 1);
+    out.reserve(count());
     for_pieces([&](const Piece<Dim>& piece) { out.insert(out.end(), piece.points.size(), piece.body); });
   }
   void add_id() {
     auto& out = columns_.add_longs("id", 1);
+    out.reserve(count());
     for_pieces([&](const Piece<Dim>& piece) { out.insert(out.end(), piece.points.ids().begin(), piece.points.ids().end()); });
   }
   void add_image() {
     auto& out = columns_.add_ints("image", 3);
+    out.reserve(3 * count());
     for_pieces([&](const Piece<Dim>& piece) {
       for (const Image& image : piece.points.images()) out.insert(out.end(), image.begin(), image.begin() + 3);
     });

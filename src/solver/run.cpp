@@ -1,17 +1,18 @@
 #include "cairn/solver/run.hpp"
 
+#include <fmt/format.h>
+
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
-#include "cairn/io/history.hpp"
+#include "cairn/io/case_changes.hpp"
 #include "cairn/io/progress.hpp"
 #include "cairn/io/result_files.hpp"
 #include "cairn/io/table_file.hpp"
-#include "cairn/solver/body_states.hpp"
+#include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/output.hpp"
-
-#include <fmt/format.h>
-
-#include <fstream>
+#include "history_tables.hpp"
+#include "restart.hpp"
+#include "stop_signal.hpp"
 
 namespace cairn {
 namespace {
@@ -20,130 +21,129 @@ namespace fs = std::filesystem;
 
 double wall_clock() { return MPI_Wtime(); }
 
-/// Says when an output is due, and counts what was written.
-class OutputClock {
- public:
-  explicit OutputClock(const Schedule& schedule) : schedule_(schedule) {}
-  bool active() const { return schedule_.active(); }
-  /// Due after this step? `wall` [s] since the start of the run, agreed by all ranks.
-  bool due(std::int64_t step, double time, double wall) const {
-    if (schedule_.every > 0 && step % schedule_.every == 0) return true;
-    if (schedule_.interval > 0 && intervals(time, schedule_.interval) > last_interval_) return true;
-    return schedule_.interval_wall > 0 && wall - last_wall_ >= schedule_.interval_wall;
-  }
-  void written(std::int64_t step, double time, double wall) {
-    last_step_ = step, last_wall_ = wall, ++count_;
-    if (schedule_.interval > 0) last_interval_ = intervals(time, schedule_.interval);
-  }
-  std::int64_t last_step() const { return last_step_; }
-  int count() const { return count_; }
-  const Schedule& schedule() const { return schedule_; }
+constexpr int done = 0, stopped = 4;  // exit codes
 
- private:
-  // A rounding error's worth early counts as reached.
-  static std::int64_t intervals(double time, double interval) {
-    return static_cast<std::int64_t>(std::floor(time / interval * (1 + 1e-12)));
-  }
-  Schedule schedule_;
-  std::int64_t last_step_ = -1, last_interval_ = -1;
-  double last_wall_ = 0;
-  int count_ = 0;
-};
-
-/// The energies' error over the largest energy seen.
-class EnergyBook {
- public:
-  /// Energies of a row; the first call sets what they started from.
-  double error(const Totals& t) {
-    if (!started_) started_ = true, initial_ = t;
-    largest_ = std::max({largest_, t.kinetic + t.strain + t.plastic + std::abs(t.potential - initial_.potential),
-                         std::abs(t.boundary_work)});
-    return largest_ > 0 ? (t.energy() - initial_.energy()) / largest_ : 0.0;
-  }
-
- private:
-  bool started_ = false;
-  Totals initial_;
-  double largest_ = 0;
-};
-
-std::vector<std::string> history_columns(int dimension) {
-  std::vector<std::string> names = {"step", "time", "dt", "kinetic_energy", "strain_energy", "potential_energy",
-                                    "plastic_dissipation", "contact_dissipation", "boundary_work", "energy_error",
-                                    "momentum_x", "momentum_y"};
-  if (dimension == 3) names.emplace_back("momentum_z");
-  names.insert(names.end(), {"contact_nodes", "mass"});
-  return names;
-}
-
-std::vector<std::string> body_columns(int dimension) {
-  if (dimension == 2) return {"step", "time", "body", "x", "y", "vx", "vy", "wz"};
-  return {"step", "time", "body", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"};
-}
+// Reasons to stop, above the numbers of signals; the largest of all ranks counts.
+constexpr double wall_limit_reached = 1000, file_failed = 2000;
 
 template <int Dim>
 class Run {
  public:
-  Run(const Case& c, const RunSettings& settings, MPI_Comm comm)
-      : case_(c), settings_(settings), comm_(comm), start_(wall_clock()), simulation_(c, comm),
-        particles_(c.output.particles), grains_(c.output.grains), contacts_(c.output.contacts), history_clock_(c.output.history),
-        particle_index_(settings.out / "particles.hdf.series") {
+  Run(const Case& c, const RunSettings& settings, MPI_Comm comm, const Checkpoint* from)
+      : case_(c),
+        settings_(settings),
+        comm_(comm),
+        start_(wall_clock()),
+        simulation_(c, comm, from),
+        particles_(c.output.particles),
+        grains_(c.output.grains),
+        contacts_(c.output.contacts),
+        history_clock_(c.output.history),
+        checkpoints_(c.output.checkpoint),
+        particle_index_(settings.out / "particles.hdf.series"),
+        tables_(settings.out, c.output.track) {
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &ranks_);
+    for (const Schedule* s :
+         {&c.output.particles, &c.output.grains, &c.output.contacts, &c.output.history, &c.output.checkpoint})
+      needs_wall_ = needs_wall_ || s->interval_wall > 0;
+    if (from) restore(from->state());
+    simulation_.ask([this] { return notice(); });
+    open_files(from);
   }
 
   int execute() {
-    open_files();
-    write_outputs(true);
+    if (steps_before_ == 0) write_outputs(true, 0);
     const double stepping = wall_clock();
     double output_wall = 0;
     ProgressDisplay display;
-    while (simulation_.time() < case_.time.end && simulation_.steps() < case_.time.steps) {
-      advance();
+    while (running()) {
+      const Notice agreed = advance();
       const double before = wall_clock();
-      write_outputs(false);
+      write_outputs(false, agreed.wall);
       if (rank_ == 0 && display.due(before)) display.show(progress(before - stepping), before);
+      if (agreed.stop > 0 && running()) {
+        display.finish();
+        return stop(agreed);
+      }
       output_wall += wall_clock() - before;
     }
     const double step_wall = wall_clock() - stepping - output_wall;
-    write_outputs(true);
-    throw_together(comm_, file_error());
+    write_outputs(true, wall_before_ + wall_clock() - start_);
+    throw_together(comm_, tables_.error());
     display.finish();
     report(step_wall);
-    return 0;
+    return done;
   }
 
  private:
-  /// One step; when it fails, the points as they are then go to a file of their own.
-  void advance() {
+  bool running() const { return simulation_.time() < case_.time.end && simulation_.steps() < case_.time.steps; }
+
+  /// One step, and what the ranks told each other in it.
+  Notice advance() {
     try {
       simulation_.step(case_.time.end - simulation_.time());
+      return simulation_.notice();
     } catch (const RunError& error) {
-      const fs::path file = settings_.out / "failure_particles.vtkhdf";
+      fail(error.what());
+    }
+  }
+
+  /// What this rank tells the others in a step.
+  Notice notice() const {
+    Notice n;
+    n.stop = signals_.received();
+    if (rank_ != 0) return n;
+    n.wall = wall_before_ + wall_clock() - start_;
+    if (case_.time.wall_limit > 0 && wall_clock() - start_ >= case_.time.wall_limit) n.stop = wall_limit_reached;
+    if (!tables_.error().empty()) n.stop = file_failed;
+    return n;
+  }
+
+  /// Leaves the points as they are now in a file of their own.
+  [[noreturn]] void fail(const std::string& reason) {
+    const fs::path file = settings_.out / failure_file;
+    std::string text = fmt::format("the state then is in {} in the folder of the results", failure_file);
+    try {
       write_particles(simulation_, file, case_.output.particles.fields);
-      throw RunError(fmt::format("{}; the state then is in {}", error.what(), file.string()));
+    } catch (const RunError& error) {
+      text = fmt::format("the state then is lost: {}", error.what());
     }
+    throw RunError(fmt::format("{}; {}", reason, text));
   }
 
-  void open_files() {
+  /// Ends the run early, with a checkpoint.
+  int stop(const Notice& agreed) {
+    throw_together(comm_, tables_.error());
+    if (checkpoints_.last_step() != simulation_.steps()) write_checkpoint_file(false);
+    if (rank_ != 0) return stopped;
+    const std::string reason = agreed.stop >= wall_limit_reached
+                                   ? fmt::format("time.wall_limit = {} s", case_.time.wall_limit)
+                                   : signal_name(static_cast<int>(agreed.stop));
+    fmt::print("stopped by {} at step {}, time {} s; the state is in {}\nresume with: {}--restart latest\n", reason,
+               simulation_.steps(), simulation_.time(), last_checkpoint_.string(), settings_.command);
+    std::fflush(stdout);
+    return stopped;
+  }
+
+  void open_files(const Checkpoint* from) {
     std::string error;
-    if (rank_ == 0 && settings_.overwrite) error = remove_results(settings_.out);
-    if (rank_ == 0 && error.empty()) {
-      std::ofstream text(settings_.out / "case.toml");
-      if (!(text << case_.resolved << std::flush)) error = fmt::format("cannot write {}", (settings_.out / "case.toml").string());
+    bool goes_on = false;
+    if (rank_ == 0) {
+      goes_on = from != nullptr && fs::exists(settings_.out / "history.csv");
+      if (settings_.overwrite) error = remove_results(settings_.out);
+      if (goes_on) error = remove_later(settings_.out, from->state(), from->file());
+      if (error.empty()) error = replace_file(settings_.out / "case.toml", case_.resolved);
+      if (error.empty()) tables_.open(from ? &from->state() : nullptr);
+      if (error.empty()) error = tables_.error();
     }
-    if (rank_ == 0 && error.empty()) {
-      history_ = CsvWriter(settings_.out / "history.csv", history_columns(Dim));
-      if (!case_.output.track.empty()) bodies_ = CsvWriter(settings_.out / "bodies.csv", body_columns(Dim));
-    }
-    throw_together(comm_, error.empty() ? file_error() : error);
+    throw_together(comm_, error);
+    MPI_Bcast(&goes_on, 1, MPI_CXX_BOOL, 0, comm_);
+    if (goes_on) particle_index_.restore(from->state().series, comm_);
   }
-
-  std::string file_error() const { return history_.error().empty() ? bodies_.error() : history_.error(); }
 
   /// Writes what is due; with `all`, everything that is active and not written at this step yet.
-  void write_outputs(bool all) {
-    const double wall = agreed_wall();
+  void write_outputs(bool all, double wall) {
     const std::int64_t step = simulation_.steps();
     const double time = simulation_.time();
     const auto wanted = [&](OutputClock& clock) {
@@ -151,97 +151,118 @@ class Run {
       if (write) clock.written(step, time, wall);
       return write;
     };
-    const auto name = [](const char* kind, const OutputClock& clock, const char* ending) {
-      return fmt::format("{}_{:06}.{}", kind, clock.count() - 1, ending);
-    };
+    const auto name = [](const char* kind, const OutputClock& clock) { return numbered_name(kind, clock.count() - 1); };
     if (wanted(history_clock_)) write_history();
     if (wanted(particles_)) {
-      const std::string file = name("particles", particles_, "vtkhdf");
+      const std::string file = name("particles", particles_);
       write_particles(simulation_, settings_.out / file, case_.output.particles.fields);
       particle_index_.add(file, time, comm_);
     }
     const bool grains = wanted(grains_), contacts = wanted(contacts_);
-    if (grains) write_grains(simulation_, settings_.out / name("grains", grains_, "h5"));
-    if (contacts) write_contacts(simulation_, settings_.out / name("contacts", contacts_, "h5"), time - contacts_cleared_);
+    if (grains) write_grains(simulation_, settings_.out / name("grains", grains_));
+    if (contacts) write_contacts(simulation_, settings_.out / name("contacts", contacts_), time - contacts_cleared_);
     if (contacts || (grains && !contacts_.active())) simulation_.clear_contacts(), contacts_cleared_ = time;
-  }
-
-  /// Wall time since the start as rank 0 sees it, where an output depends on it.
-  double agreed_wall() {
-    double wall = wall_clock() - start_;
-    const auto& o = case_.output;
-    if (o.particles.interval_wall > 0 || o.grains.interval_wall > 0 || o.contacts.interval_wall > 0 || o.history.interval_wall > 0)
-      MPI_Bcast(&wall, 1, MPI_DOUBLE, 0, comm_);
-    return wall;
+    if (step == 0) checkpoints_.skip(step, time, wall);  // nothing is lost by starting again
+    if (wanted(checkpoints_)) write_checkpoint_file(true);
   }
 
   void write_history() {
     const Totals t = simulation_.totals();
-    energy_error_ = book_.error(t);
-    if (rank_ == 0) {
-      std::vector<CsvValue> row = {simulation_.steps(), simulation_.time(), simulation_.dt(), t.kinetic, t.strain, t.potential,
-                                   t.plastic, t.contact_dissipation, t.boundary_work, energy_error_};
-      for (int d = 0; d < Dim; ++d) row.emplace_back(t.momentum[d]);
-      row.emplace_back(static_cast<std::int64_t>(t.contact_nodes));
-      row.emplace_back(t.mass);
-      history_.add_row(row);
-    }
-    if (!case_.output.track.empty()) write_bodies();
+    if (rank_ == 0) book_.add(t);
+    tables_.add(simulation_, t, book_.error());
+    const double limit = case_.solver.energy_limit;
+    if (limit == 0) return;
+    double error = book_.error();
+    MPI_Bcast(&error, 1, MPI_DOUBLE, 0, comm_);
+    if (!(std::abs(error) <= limit))
+      fail(fmt::format("step {}: the energy error is {:.3g}, above solver.energy_limit = {}", simulation_.steps(),
+                       error, limit));
   }
 
-  void write_bodies() {
-    // Tracked bodies are few: each rank sends those it answers for to rank 0.
-    constexpr int width = 10;
-    std::vector<double> mine;
-    for (const BodyState& s : body_states(simulation_))
-      if (std::find(case_.output.track.begin(), case_.output.track.end(), s.body) != case_.output.track.end()) {
-        mine.push_back(s.body);
-        for (const Vec3& v : {s.centre, s.velocity, s.angular_velocity}) mine.insert(mine.end(), v.data(), v.data() + 3);
-      }
-    std::vector<int> counts(ranks_), starts(ranks_, 0);
-    const int count = static_cast<int>(mine.size());
-    MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm_);
-    for (int r = 1; r < ranks_; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-    std::vector<double> all(rank_ == 0 ? starts.back() + counts.back() : 0);
-    MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm_);
-    for (std::size_t i = 0; i < all.size(); i += width) {
-      std::vector<CsvValue> row = {simulation_.steps(), simulation_.time(), static_cast<std::int64_t>(all[i])};
-      for (int group = 0; group < 3; ++group)
-        for (int d = 0; d < 3; ++d)
-          if (Dim == 3 || (group == 2) == (d == 2)) row.emplace_back(all[i + 1 + 3 * group + d]);
-      bodies_.add_row(row);
-    }
+  /// Writes a checkpoint under the next number. One that is `scheduled` has been counted; another one, at a stop,
+  /// leaves the count alone, so that the files that follow have the numbers of a run that was not stopped.
+  void write_checkpoint_file(bool scheduled) {
+    throw_together(comm_, tables_.error());
+    RunState state;
+    state.step = simulation_.step_state();
+    if (rank_ == 0) tables_.note_positions(state);
+    throw_together(comm_, tables_.error());
+    share_rank_zero(state);
+    state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
+    state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
+    state.contacts_cleared = contacts_cleared_, state.contacts_kept = contacts_kept();
+    state.series = particle_index_.entries();
+    state.bodies = bodies_checksum(case_);
+    const std::int64_t number = checkpoints_.count() - (scheduled ? 1 : 0);
+    last_checkpoint_ = settings_.out / numbered_name("checkpoint", number);
+    write_checkpoint(last_checkpoint_, simulation_, state, case_.resolved);
+    if (rank_ == 0) keep_last(settings_.out, case_.output.checkpoint.keep);
   }
+
+  /// What rank 0 alone knows.
+  void share_rank_zero(RunState& state) {
+    state.energy = book_.state();
+    if (needs_wall_) state.wall = wall_before_ + wall_clock() - start_;
+    MPI_Bcast(&state.energy, sizeof state.energy, MPI_BYTE, 0, comm_);
+    MPI_Bcast(&state.wall, 1, MPI_DOUBLE, 0, comm_);
+    MPI_Bcast(&state.history_file, sizeof state.history_file, MPI_BYTE, 0, comm_);
+    MPI_Bcast(&state.bodies_file, sizeof state.bodies_file, MPI_BYTE, 0, comm_);
+  }
+
+  void restore(const RunState& state) {
+    particles_.restore(state.particles), grains_.restore(state.grains), contacts_.restore(state.contacts);
+    history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
+    book_.restore(state.energy);
+    contacts_cleared_ = state.contacts_kept ? state.contacts_cleared : simulation_.time();
+    if (!contacts_kept()) simulation_.clear_contacts();
+    steps_before_ = simulation_.steps();
+    fraction_before_ = fraction();
+    wall_before_ = state.wall;
+  }
+
+  bool contacts_kept() const { return grains_.active() || contacts_.active(); }
+
+  double fraction() const {
+    const double by_time = std::isfinite(case_.time.end) ? simulation_.time() / case_.time.end : 0;
+    return std::max(by_time, static_cast<double>(simulation_.steps()) / static_cast<double>(case_.time.steps));
+  }
+  double steps_here() const { return static_cast<double>(simulation_.steps() - steps_before_); }
 
   Progress progress(double wall) const {
     Progress p;
-    const double by_time = std::isfinite(case_.time.end) ? simulation_.time() / case_.time.end : 0;
-    p.fraction = std::max(by_time, static_cast<double>(simulation_.steps()) / static_cast<double>(case_.time.steps));
-    p.time = simulation_.time(), p.step = simulation_.steps(), p.dt = simulation_.dt(), p.points = simulation_.total_points();
-    p.point_steps_per_second_rank = wall > 0 ? static_cast<double>(p.points) * static_cast<double>(p.step) / wall / ranks_ : 0;
-    p.energy_error = energy_error_;
-    p.wall_left = estimate_wall_left(p.fraction, 0, wall);
+    p.fraction = fraction();
+    p.time = simulation_.time(), p.step = simulation_.steps(), p.dt = simulation_.dt(),
+    p.points = simulation_.total_points();
+    p.point_steps_per_second_rank = wall > 0 ? static_cast<double>(p.points) * steps_here() / wall / ranks_ : 0;
+    p.energy_error = book_.error();
+    p.wall_left = estimate_wall_left(p.fraction, fraction_before_, wall);
     return p;
   }
 
   void report(double step_wall) const {
+    const std::int64_t sent[2] = {simulation_.traffic().messages, simulation_.traffic().bytes};
+    std::int64_t most_sent[2] = {0, 0};
+    MPI_Reduce(sent, most_sent, 2, MPI_INT64_T, MPI_MAX, 0, comm_);
     if (rank_ != 0) return;
     double total = 0;
     std::string shares;
-    for (std::size_t s = 0; s + 1 < stage_names.size(); ++s) total += simulation_.timers().seconds(static_cast<Stage>(s));
     for (std::size_t s = 0; s + 1 < stage_names.size(); ++s)
-      shares += fmt::format(" {} {:.1f} %", stage_names[s], 100 * simulation_.timers().seconds(static_cast<Stage>(s)) / std::max(total, 1e-30));
+      total += simulation_.timers().seconds(static_cast<Stage>(s));
+    for (std::size_t s = 0; s + 1 < stage_names.size(); ++s)
+      shares += fmt::format(" {} {:.1f} %", stage_names[s],
+                            100 * simulation_.timers().seconds(static_cast<Stage>(s)) / std::max(total, 1e-30));
     fmt::print("time of rank 0:{}\n", shares);
     if (settings_.profile) {
-      const double steps = static_cast<double>(std::max<std::int64_t>(1, simulation_.steps()));
-      fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", simulation_.traffic().messages / steps,
-                 simulation_.traffic().bytes / steps);
+      const double steps = std::max(1.0, steps_here());
+      fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", sent[0] / steps, sent[1] / steps);
+      fmt::print("most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most_sent[0] / steps,
+                 most_sent[1] / steps);
     }
     RunSummary s;
-    s.steps = simulation_.steps(), s.points = simulation_.total_points(), s.time = simulation_.time();
+    s.steps = simulation_.steps() - steps_before_, s.points = simulation_.total_points(), s.time = simulation_.time();
     s.wall = wall_clock() - start_, s.step_wall = step_wall;
     s.point_steps = static_cast<double>(s.steps) * static_cast<double>(s.points);
-    s.energy_error = energy_error_, s.ranks = ranks_;
+    s.energy_error = book_.error(), s.ranks = ranks_;
     fmt::print("{}\n", format_summary(s));
   }
 
@@ -249,21 +270,32 @@ class Run {
   const RunSettings& settings_;
   MPI_Comm comm_;
   int rank_ = 0, ranks_ = 1;
+  StopSignals signals_;
   double start_;
   Simulation<Dim> simulation_;
-  OutputClock particles_, grains_, contacts_, history_clock_;
+  OutputClock particles_, grains_, contacts_, history_clock_, checkpoints_;
   SeriesIndex particle_index_;
-  CsvWriter history_, bodies_;
+  HistoryTables<Dim> tables_;
   EnergyBook book_;
-  double energy_error_ = 0, contacts_cleared_ = 0;
+  bool needs_wall_ = false;      // an output depends on wall time
+  double contacts_cleared_ = 0;  // [s]
+  fs::path last_checkpoint_;
+  std::int64_t steps_before_ = 0;  // of the run, before this process
+  double fraction_before_ = 0, wall_before_ = 0;
 };
+
+template <int Dim>
+int run(const Case& c, const RunSettings& settings, MPI_Comm comm) {
+  auto from = open_restart(c, settings, comm);
+  Run<Dim> work(c, settings, comm, from.get());
+  from.reset();  // its file is open no longer than needed
+  return work.execute();
+}
 
 }  // namespace
 
 int run_case(const Case& c, const RunSettings& settings, MPI_Comm comm) {
-  if (!settings.restart.empty()) throw InputError("--restart: this version writes no checkpoints; run without it");
-  if (c.domain.dimension == 2) return Run<2>(c, settings, comm).execute();
-  return Run<3>(c, settings, comm).execute();
+  return c.domain.dimension == 2 ? run<2>(c, settings, comm) : run<3>(c, settings, comm);
 }
 
 }  // namespace cairn

@@ -1,6 +1,8 @@
 #include "cairn/core/error.hpp"
 #include "cairn/parallel/distribution.hpp"
+#include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/simulation.hpp"
+#include "memory.hpp"
 
 #include <fmt/format.h>
 
@@ -122,6 +124,7 @@ class Filler {
       points.ids()[p] = first_id++;
       points.images()[p] = image;
     });
+    for (auto& piece : patch.pieces) piece.points.shrink_to_fit();
   }
 
  private:
@@ -177,7 +180,7 @@ void check_bodies(const Case& c, std::vector<std::int64_t>& points_of_body, MPI_
 }  // namespace
 
 template <int Dim>
-Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
+Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from)
     : comm_(comm), solver_(c.solver), parallel_(c.parallel), limits_(c.time), lattice_(make_lattice<Dim>(c.domain)),
       transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))), faces_(make_faces<Dim>(c)) {
   MPI_Comm_rank(comm_, &rank_);
@@ -194,7 +197,34 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   bodies_ = make_bodies(c, materials_);
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
+  if (from) restore(*from);
+  else place_points(c);
+}
 
+template <int Dim>
+void Simulation<Dim>::make_patches(const std::vector<std::int64_t>& points) {
+  total_points_ = std::accumulate(points.begin(), points.end(), std::int64_t{0});
+  owner_ = distribute_patches(lattice_, points, ranks_, parallel_.partition);
+  const std::int64_t mine = points_of_rank(points, owner_, rank_);
+  require_memory(estimated_memory<Dim>(mine, solver_, transfer_.extras), comm_);
+  for (int patch = 0; patch < lattice_.patch_count(); ++patch)
+    if (owner_[patch] == rank_) patches_.emplace_back(patch, lattice_);
+}
+
+template <int Dim>
+void Simulation<Dim>::restore(const Checkpoint& from) {
+  from.check_layout(lattice_);
+  make_patches(from.points());
+  from.fill(patches_, bodies_, materials_);
+  connect_patches();
+  const StepState& state = from.state().step;
+  time_ = state.time, dt_ = state.dt, steps_ = state.steps;
+  speed_result_[0] = state.wave_speed, speed_result_[1] = state.point_speed;
+  speeds_ = {};
+}
+
+template <int Dim>
+void Simulation<Dim>::place_points(const Case& c) {
   // Each rank counts the points of some patches; then every rank knows all counts and deals the patches out alike.
   const Filler<Dim> filler(c, lattice_, bodies_, materials_);
   std::vector<std::int64_t> count(lattice_.patch_count(), 0), of_body(bodies_.size(), 0);
@@ -202,15 +232,12 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
     filler.for_points(patch, [&](int body, const Vec3&, const Vec3&) { ++count[patch], ++of_body[body]; });
   MPI_Allreduce(MPI_IN_PLACE, count.data(), static_cast<int>(count.size()), MPI_INT64_T, MPI_SUM, comm_);
   check_bodies(c, of_body, comm_);
-  total_points_ = std::accumulate(count.begin(), count.end(), std::int64_t{0});
-  owner_ = distribute_patches(lattice_, count, ranks_, c.parallel.partition);
+  make_patches(count);
 
   std::int64_t first_id = 0;
-  for (int patch = 0; patch < lattice_.patch_count(); first_id += count[patch], ++patch) {
-    if (owner_[patch] != rank_) continue;
-    patches_.emplace_back(patch, lattice_);
-    filler.fill(patches_.back(), first_id);
-  }
+  auto patch = patches_.begin();
+  for (int id = 0; id < lattice_.patch_count(); first_id += count[id], ++id)
+    if (owner_[id] == rank_) filler.fill(*patch++, first_id);
   connect_patches();
 
   for_pieces([&](Piece<Dim>& piece) {
@@ -223,7 +250,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm)
   start_speed_reduction();
 }
 
-template Simulation<2>::Simulation(const Case&, MPI_Comm);
-template Simulation<3>::Simulation(const Case&, MPI_Comm);
+template Simulation<2>::Simulation(const Case&, MPI_Comm, const Checkpoint*);
+template Simulation<3>::Simulation(const Case&, MPI_Comm, const Checkpoint*);
 
 }  // namespace cairn

@@ -206,8 +206,16 @@ template <int Dim>
 void Simulation<Dim>::start_speed_reduction() {
   speed_message_[0] = speeds_.wave, speed_message_[1] = speeds_.point;
   speed_message_[2] = migration_->failure().empty() ? 0 : 1;
-  MPI_Iallreduce(speed_message_, speed_result_, 3, MPI_DOUBLE, MPI_MAX, comm_, &speed_request_);
+  const Notice notice = ask_ ? ask_() : Notice{};
+  speed_message_[3] = notice.stop, speed_message_[4] = notice.wall;
+  MPI_Iallreduce(speed_message_, speed_result_, speed_size, MPI_DOUBLE, MPI_MAX, comm_, &speed_request_);
   speeds_ = {};
+}
+
+template <int Dim>
+StepState Simulation<Dim>::step_state() {
+  finish_speed_reduction();
+  return {time_, dt_, speed_result_[0], speed_result_[1], steps_};
 }
 
 template <int Dim>

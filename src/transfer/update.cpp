@@ -141,7 +141,7 @@ void integrate(Piece<Dim>& piece, double dt) {
   using N = NodeSums<Dim>;
   using M = NodeMotion<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  nodes.motion.resize(nodes.box.size() * M::width);
+  resize_exactly(nodes.motion, nodes.box.size() * M::width);
   for (std::size_t node = 0; node < nodes.box.size(); ++node) {
     const double* sums = nodes.sums.data() + node * N::width;
     const double* force = nodes.force.data() + node * vector_width;
@@ -159,7 +159,7 @@ template <int Dim>
 void velocity_from_sums(Piece<Dim>& piece) {
   using N = NodeSums<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  nodes.velocity.resize(nodes.box.size() * vector_width);
+  resize_exactly(nodes.velocity, nodes.box.size() * vector_width);
   for (std::size_t node = 0; node < nodes.box.size(); ++node) {
     const double* sums = nodes.sums.data() + node * N::width;
     double* velocity = nodes.velocity.data() + node * vector_width;

@@ -21,7 +21,8 @@ namespace {
 
 constexpr double density = 1900, spacing = 1e-5;  // [kg/m3], [m]
 constexpr double wave_speed = 3400;               // about that of the laws below [m/s]
-constexpr double dt = 1e-9 * spacing / wave_speed;  // so short that the state hardly changes however often it is advanced
+constexpr double dt =
+    1e-9 * spacing / wave_speed;  // so short that the state hardly changes however often it is advanced
 
 enum class Size { grain, block };
 
@@ -131,25 +132,33 @@ void add_kernels() {
         add<Dim>(name, shape, "neo_hookean", size, run, false);
       };
       plain("project", [](W& w, P& p) { project(p, w.lattice, w.settings, density); });
-      plain("accelerate_and_project", [](W& w, P& p) { accelerate_and_project(p, w.lattice, w.settings, density, dt); });
+      plain("accelerate_and_project",
+            [](W& w, P& p) { accelerate_and_project(p, w.lattice, w.settings, density, dt); });
       plain("move", [](W& w, P& p) {
         SpeedLimits speeds;
         move(p, w.lattice, w.settings, dt, speeds);
       });
       for (const char* law : {"neo_hookean", "von_mises"}) {
-        add<Dim>("update_stress", shape, law, size, [](W& w, P& p) {
-          SpeedLimits speeds;
-          update_stress(p, w.lattice, w.settings, w.law, density, dt, speeds);
-        }, true);
-        add<Dim>("update_stress_and_force", shape, law, size, [](W& w, P& p) {
-          SpeedLimits speeds;
-          update_stress_and_force(p, w.lattice, w.settings, w.law, density, dt, speeds);
-        }, true);
+        add<Dim>(
+            "update_stress", shape, law, size,
+            [](W& w, P& p) {
+              SpeedLimits speeds;
+              update_stress(p, w.lattice, w.settings, w.law, density, dt, speeds);
+            },
+            true);
+        add<Dim>(
+            "update_stress_and_force", shape, law, size,
+            [](W& w, P& p) {
+              SpeedLimits speeds;
+              update_stress_and_force(p, w.lattice, w.settings, w.law, density, dt, speeds);
+            },
+            true);
       }
     }
 }
 
-/// a = b + s c with arrays of 64 MiB; 24 bytes are counted for each element, as is usual, though the store may also read.
+/// a = b + s c with arrays of 64 MiB; 24 bytes are counted for each element, as is usual, though the store may also
+/// read.
 void triad(benchmark::State& state) {
   constexpr std::size_t n = (std::size_t{64} << 20) / sizeof(double);
   AlignedDoubles a(n), b(n), c(n);

@@ -42,12 +42,20 @@ class Points {
 
   /// Changes the number of points; the first min(old, new) are kept, new ones are unset.
   void resize(int size);
+  /// Gives back memory beyond what the points need.
+  void shrink_to_fit() {
+    reallocate(size_);
+    ids_.shrink_to_fit();
+    images_.shrink_to_fit();
+  }
   /// Keeps the points listed, in that order (ascending or not).
   void select(std::span<const int> order);
   /// Bytes held.
   std::size_t memory() const { return data_.capacity() * sizeof(double) + ids_.capacity() * 8 + images_.capacity() * 8; }
 
  private:
+  void reallocate(int capacity);
+
   int size_ = 0, capacity_ = 0, columns_;
   AlignedDoubles data_;
   std::vector<std::int64_t> ids_;

@@ -29,4 +29,13 @@ struct AlignedAllocator {
 
 using AlignedDoubles = std::vector<double, AlignedAllocator<double>>;
 
+/// Changes the size without room for more and without keeping the values.
+inline void resize_exactly(AlignedDoubles& values, std::size_t size) {
+  if (values.capacity() < size) {
+    values = AlignedDoubles();
+    values.reserve(size);
+  }
+  values.resize(size);
+}
+
 }  // namespace cairn

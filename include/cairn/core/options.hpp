@@ -31,6 +31,7 @@ struct SolverOptions {
   StressUpdate stress_update = StressUpdate::both;
   double flip = 1.0;        // 1: FLIP, 0: PIC
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
+  double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };
 
 /// Overrides for one pair of materials. The name "wall" stands for wall faces.

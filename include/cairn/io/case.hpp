@@ -27,7 +27,8 @@ struct Time {
   double end = std::numeric_limits<double>::infinity();  // [s]
   std::int64_t steps = std::numeric_limits<std::int64_t>::max();
   double cfl = 0.4;
-  double dt = 0;  // fixed step [s]; 0: from cfl
+  double dt = 0;          // fixed step [s]; 0: from cfl
+  double wall_limit = 0;  // wall time after which the run stops with a checkpoint [s]; 0: none
 };
 
 struct Material {

@@ -9,7 +9,7 @@
 namespace cairn {
 
 struct KeyChange {
-  std::string key;          // dotted path
+  std::string key;            // dotted path
   std::string before, after;  // values as TOML; "(none)" where the key is missing
 };
 

@@ -31,7 +31,8 @@ class CheckpointWriter {
   std::unique_ptr<State> state_;
 };
 
-/// Opens a checkpoint whose seal is unbroken. Members are collective and throw InputError naming the file on every rank.
+/// Opens a checkpoint whose seal is unbroken. Members are collective and throw InputError naming the file on every
+/// rank.
 class CheckpointReader {
  public:
   /// \throws InputError if the file is missing, cut short, damaged, or no checkpoint of this version

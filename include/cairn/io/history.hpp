@@ -24,7 +24,8 @@ struct CsvPosition {
 
 /// What keeps the file from being continued at `from`: it is missing, shorter, or holds something else up to there.
 /// Empty if nothing does. Not collective.
-std::string check_prefix(const std::filesystem::path& file, const std::vector<std::string>& columns, const CsvPosition& from);
+std::string check_prefix(const std::filesystem::path& file, const std::vector<std::string>& columns,
+                         const CsvPosition& from);
 
 /// Creates the file with its header at once and appends whole lines, each with one write to the system, so that
 /// neither the program nor its end leaves part of a line. A default-constructed writer (ranks other than 0) does

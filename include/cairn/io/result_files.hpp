@@ -24,7 +24,8 @@ struct NumberedFile {
   std::filesystem::path file;
 };
 
-/// The result files KIND_N of a folder, ascending in N; KIND is particles, grains, contacts or checkpoint. Not collective.
+/// The result files KIND_N of a folder, ascending in N; KIND is particles, grains, contacts or checkpoint. Not
+/// collective.
 std::vector<NumberedFile> numbered_files(const std::filesystem::path& folder, const std::string& kind);
 
 /// KIND_N with at least six digits and the ending of its kind.

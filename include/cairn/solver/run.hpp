@@ -14,6 +14,8 @@ struct RunSettings {
   std::filesystem::path out;  // folder of the results; exists
   std::string restart;        // empty: from the start; "latest": the last checkpoint in `out`; else a checkpoint file
   bool profile = false;       // report where the time went
+  bool allow_changes = false;  // go on from a checkpoint of a case that differs
+  std::string command;         // of this run without --restart, for the message that says how to resume
   bool overwrite = false;     // remove the results of an earlier run from `out`, once the case has been set up
 };
 

@@ -8,6 +8,7 @@
 #include "cairn/solver/timers.hpp"
 #include "cairn/transfer/transfer.hpp"
 
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -33,16 +34,42 @@ struct Totals {
   double energy() const { return kinetic + strain + potential + plastic + contact_dissipation - boundary_work; }
 };
 
+/// Where the stepping stands: with the points, all that the next step depends on.
+struct StepState {
+  double time = 0, dt = 0;                  // dt: of the last step [s]
+  double wave_speed = 0, point_speed = 0;   // largest over all points, for the next dt [m/s]
+  std::int64_t steps = 0;
+};
+
+/// What ranks tell each other along with the speeds; the largest of each counts. It costs no communication of its own.
+struct Notice {
+  double stop = 0;  // a reason to stop, above 0
+  double wall = 0;  // a wall time [s]
+};
+
+class Checkpoint;
+
 template <int Dim>
 class Simulation {
  public:
-  /// Places the points of the case's bodies. Collective.
-  /// \throws InputError for a body without points, on every rank
-  Simulation(const Case& c, MPI_Comm comm);
+  /// Places the points of the case's bodies, or takes them from a checkpoint. Collective.
+  /// \throws InputError on every rank for a body without points, a checkpoint that does not fit, or points for which this
+  /// machine has too little memory
+  Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from = nullptr);
 
   /// Advances one step of at most `longest` seconds. Collective.
   /// \throws RunError on every rank when a point is lost or the time step collapses
   void step(double longest);
+
+  /// Waits for the speeds of the last step. Collective. \throws RunError on every rank where that step lost a point
+  StepState step_state();
+  /// Has every step ask `notice` what this rank tells the others.
+  void ask(std::function<Notice()> notice) { ask_ = std::move(notice); }
+  /// What the ranks told each other in the last step, the same on all of them. Collective; throws as step_state().
+  Notice notice() {
+    finish_speed_reduction();
+    return {speed_result_[3], speed_result_[4]};
+  }
 
   double time() const { return time_; }
   double dt() const { return dt_; }  // of the last step
@@ -82,6 +109,9 @@ class Simulation {
   void move_points();
   void migrate_points();                 // (*)
 
+  void place_points(const Case& c);
+  void restore(const Checkpoint& from);
+  void make_patches(const std::vector<std::int64_t>& points);  // of every patch; those of this rank, without points
   void connect_patches();                // after patches came or went
   void balance();                        // (*)
 
@@ -127,7 +157,9 @@ class Simulation {
   double time_ = 0, dt_ = 0;
   std::int64_t steps_ = 0, total_points_ = 0;
   SpeedLimits speeds_;                            // of this rank, in the step under way
-  double speed_message_[3] = {0, 0, 0}, speed_result_[3] = {0, 0, 0};  // wave, point, failure
+  static constexpr int speed_size = 5;
+  double speed_message_[speed_size] = {}, speed_result_[speed_size] = {};  // wave, point, failure, stop, wall
+  std::function<Notice()> ask_;
   MPI_Request speed_request_ = MPI_REQUEST_NULL;
 };
 

@@ -1,0 +1,69 @@
+#pragma once
+/// The columns of a checkpoint, shared by writing and reading.
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cairn/body/patch.hpp"
+#include "cairn/io/table_file.hpp"
+#include "cairn/solver/simulation.hpp"
+
+namespace cairn::checkpoint {
+
+/// Neighbouring columns of the points that make one column of the file.
+struct Quantity {
+  std::string name;
+  int first, components;
+};
+
+/// `states`: the most state variables that any material has; points with fewer get zeros.
+template <int Dim>
+std::vector<Quantity> quantities(int states) {
+  using C = PointColumns<Dim>;
+  std::vector<Quantity> list = {{"position", C::position, Dim},
+                                {"velocity", C::velocity, Dim},
+                                {"deformation_gradient", C::deformation, tensor_size<Dim>},
+                                {"stress", C::stress, symmetric_size<Dim>},
+                                {"initial_volume", C::volume, 1}};
+  if (states > 0) list.push_back({"state", C::state, states});
+  return list;
+}
+
+inline int most_states(const std::vector<SolverMaterial>& materials) {
+  std::size_t most = 0;
+  for (const auto& m : materials) most = std::max(most, m.state_names.size());
+  return static_cast<int>(most);
+}
+
+inline constexpr int image_components = 3;
+inline constexpr const char* checksums_name =
+    "checksums";  // for each patch, one of each column in the order of writing
+
+/// Rows of every patch in some table.
+using Counts = std::vector<std::int64_t>;
+struct Layout {
+  Counts points, pieces, contacts;
+};
+
+/// Rows of a table in patch order that belong to this rank's patches.
+template <int Dim>
+RowBlocks rows_of(const std::vector<Patch<Dim>>& patches, const Counts& counts) {
+  RowBlocks rows;
+  auto patch = patches.begin();
+  for (int id = 0; id < static_cast<int>(counts.size()); rows.total_rows += counts[id], ++id) {
+    if (patch == patches.end() || patch->id != id) continue;
+    if (counts[id] > 0) rows.blocks.push_back({rows.total_rows, counts[id]});
+    ++patch;
+  }
+  return rows;
+}
+
+/// Calls f(piece) for every piece of the patch with points: what a checkpoint holds.
+template <int Dim, class F>
+void for_filled(const Patch<Dim>& patch, F&& f) {
+  for (const auto& piece : patch.pieces)
+    if (piece.points.size() > 0) f(piece);
+}
+
+}  // namespace cairn::checkpoint

@@ -1,0 +1,218 @@
+#include <fmt/format.h>
+
+#include <bit>
+#include <numeric>
+#include <sstream>
+#include <type_traits>
+
+#include "cairn/io/checksum.hpp"
+#include "cairn/solver/checkpoint.hpp"
+#include "checkpoint_columns.hpp"
+
+namespace cairn {
+
+namespace {
+
+using namespace checkpoint;
+
+/// Reads columns in the order in which they were written and compares each patch's part with its checksum. What is
+/// wrong on this rank is kept until `settle`, so that all ranks stay together.
+template <int Dim>
+class ColumnReader {
+ public:
+  ColumnReader(const CheckpointReader& reader, const std::vector<Patch<Dim>>& patches, std::size_t patch_count,
+               int columns)
+      : reader_(reader), patches_(patches), one_each_(patch_count, 1), columns_(columns) {
+    const RowBlocks rows = rows_of(patches_, one_each_);
+    sums_.resize(patches_.size() * static_cast<std::size_t>(columns_));
+    reader_.table().read(checksums_name, columns_, rows, std::span(sums_));
+  }
+
+  template <class T>
+  std::vector<T> read(const std::string& name, int components, const Counts& counts) {
+    const RowBlocks rows = rows_of(patches_, counts);
+    std::vector<T> values(static_cast<std::size_t>(rows.local_rows() * components));
+    reader_.table().read(name, components, rows, std::span(values));
+    std::size_t at = 0;
+    for (std::size_t p = 0; p < patches_.size(); ++p) {
+      const auto size = static_cast<std::size_t>(counts[patches_[p].id] * components);
+      const std::uint64_t sum = checksum(std::span<const T>(values).subspan(at, size));
+      if (std::bit_cast<std::int64_t>(sum) != sums_[p * columns_ + column_])
+        require(false, fmt::format("damaged: column {} of patch {} does not match its checksum", name, patches_[p].id));
+      at += size;
+    }
+    ++column_;
+    return values;
+  }
+  template <class T>
+  std::vector<T> read_patches(const std::string& name) {
+    return read<T>(name, 1, one_each_);
+  }
+
+  void require(bool good, const std::string& problem) {
+    if (!good && problem_.empty()) problem_ = problem;
+  }
+  /// \throws InputError on every rank if anything was wrong on any
+  void settle() const { reader_.require(problem_); }
+
+ private:
+  const CheckpointReader& reader_;
+  const std::vector<Patch<Dim>>& patches_;
+  Counts one_each_;
+  int columns_, column_ = 0;
+  std::vector<std::int64_t> sums_;
+  std::string problem_;
+};
+
+template <int Dim>
+void read_ledgers(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches) {
+  // The counts are known, and shown here to be what was written.
+  for (const char* name : {"patch_points", "patch_pieces", "patch_contacts"})
+    in.template read_patches<std::int64_t>(name);
+  const auto dissipation = in.template read_patches<double>("contact_dissipation");
+  const auto work = in.template read_patches<double>("boundary_work");
+  const auto nodes = in.template read_patches<std::int64_t>("contact_nodes");
+  for (std::size_t p = 0; p < patches.size(); ++p) patches[p].ledger = {dissipation[p], work[p], nodes[p]};
+  in.settle();
+}
+
+/// Makes the pieces with room for their points.
+template <int Dim>
+void read_pieces(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout,
+                 const std::vector<Body>& bodies, const std::vector<SolverMaterial>& materials) {
+  const auto body = in.template read<std::int32_t>("piece_body", 1, layout.pieces);
+  const auto count = in.template read<std::int64_t>("piece_points", 1, layout.pieces);
+  const auto states = in.template read<std::int32_t>("piece_states", 1, layout.pieces);
+  in.settle();
+  std::size_t row = 0;
+  for (auto& patch : patches) {
+    std::int64_t points = 0;
+    for (std::int64_t i = 0; i < layout.pieces[patch.id]; ++i, ++row) {
+      const bool known = body[row] >= 0 && body[row] < std::ssize(bodies);
+      in.require(known, fmt::format("it holds a body {}; the case has {} bodies", body[row], bodies.size()));
+      if (!known) continue;
+      const auto& material = materials[bodies[body[row]].material];
+      in.require(states[row] == std::ssize(material.state_names),
+                 fmt::format("body {} has {} state variables, material {} has {}", body[row], states[row],
+                             material.name, material.state_names.size()));
+      patch.pieces.emplace_back(body[row], states[row]);
+      patch.pieces.back().points.resize(static_cast<int>(count[row]));
+      points += count[row];
+    }
+    in.require(points == layout.points[patch.id],
+               fmt::format("the pieces of patch {} do not hold its points", patch.id));
+  }
+  in.settle();
+}
+
+template <int Dim>
+void read_contacts(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout) {
+  constexpr std::size_t size = ContactSum<Dim>::size;
+  const auto pairs = in.template read<std::int32_t>("contact_bodies", 2, layout.contacts);
+  const auto sums = in.template read<double>("contact_sums", size, layout.contacts);
+  in.settle();
+  std::size_t row = 0;
+  for (auto& patch : patches)
+    for (std::int64_t i = 0; i < layout.contacts[patch.id]; ++i, ++row)
+      std::copy_n(&sums[row * size], size, patch.contacts[{pairs[2 * row], pairs[2 * row + 1]}].values.begin());
+}
+
+template <int Dim>
+void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout, int states) {
+  {
+    const auto ids = in.template read<std::int64_t>("id", 1, layout.points);
+    const auto images = in.template read<std::int32_t>("image", image_components, layout.points);
+    std::size_t row = 0;
+    for (auto& patch : patches)
+      for (auto& piece : patch.pieces)
+        for (int p = 0; p < piece.points.size(); ++p, ++row) {
+          piece.points.ids()[p] = ids[row];
+          Image image{};
+          for (int i = 0; i < image_components; ++i)
+            image[i] = static_cast<std::int16_t>(images[row * image_components + i]);
+          piece.points.images()[p] = image;
+        }
+  }
+  for (const Quantity& q : quantities<Dim>(states)) {
+    const auto values = in.template read<double>(q.name, q.components, layout.points);
+    const double* from = values.data();
+    for (auto& patch : patches)
+      for (auto& piece : patch.pieces) {
+        Points<Dim>& points = piece.points;
+        const int components = std::min(q.components, points.columns() - q.first);
+        for (int c = 0; c < components; ++c)
+          for (int p = 0; p < points.size(); ++p)
+            points.column(q.first + c)[p] = from[static_cast<std::ptrdiff_t>(p) * q.components + c];
+        from += static_cast<std::ptrdiff_t>(points.size()) * q.components;
+      }
+  }
+  in.settle();
+}
+
+RunState read_state(const CheckpointReader& reader) {
+  RunState state;
+  for_each_number(state, [&]<class T>(const std::string& name, T& value) {
+    if constexpr (std::is_same_v<T, std::uint64_t>) {
+      std::int64_t bits = 0;
+      reader.read(name, bits);
+      value = std::bit_cast<std::uint64_t>(bits);
+    } else {
+      reader.read(name, value);
+    }
+  });
+  state.step.time = reader.table().time(), state.step.steps = reader.table().step();
+  const auto times = reader.column<double>("series_time");
+  std::istringstream names(reader.text("series_names"));
+  std::string name;
+  for (const double time : times)
+    if (std::getline(names, name)) state.series.push_back({name, time});
+  return state;
+}
+
+}  // namespace
+
+Checkpoint::Checkpoint(const std::filesystem::path& file, MPI_Comm comm)
+    : reader_(file, comm),
+      comm_(comm),
+      state_(read_state(reader_)),
+      case_text_(reader_.text("case")),
+      points_(reader_.column<std::int64_t>("patch_points")),
+      pieces_(reader_.column<std::int64_t>("patch_pieces")),
+      contacts_(reader_.column<std::int64_t>("patch_contacts")) {
+  const bool consistent = points_.size() == pieces_.size() && points_.size() == contacts_.size() &&
+                          std::accumulate(points_.begin(), points_.end(), std::int64_t{0}) == reader_.table().rows();
+  reader_.require(consistent ? "" : "damaged: the tables of patches do not fit together");
+}
+
+template <int Dim>
+void Checkpoint::check_layout(const Lattice<Dim>& lattice) const {
+  std::int64_t dimension = 0;
+  reader_.read("dimension", dimension);
+  reader_.require(dimension == Dim ? "" : fmt::format("it is of a case in {} dimensions, not {}", dimension, Dim));
+  reader_.require(std::ssize(points_) == lattice.patch_count()
+                      ? ""
+                      : fmt::format("it holds {} patches, the case has {}", points_.size(), lattice.patch_count()));
+}
+
+template <int Dim>
+void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const std::vector<Body>& bodies,
+                      const std::vector<SolverMaterial>& materials) const {
+  const Layout layout{points_, pieces_, contacts_};
+  const int states = most_states(materials);
+  constexpr int columns_besides_quantities = 13;
+  const int columns = columns_besides_quantities + static_cast<int>(quantities<Dim>(states).size());
+  ColumnReader<Dim> in(reader_, patches, points_.size(), columns);
+  read_ledgers(in, patches);
+  read_pieces(in, patches, layout, bodies, materials);
+  read_contacts(in, patches, layout);
+  read_points(in, patches, layout, states);
+}
+
+template void Checkpoint::check_layout(const Lattice<2>&) const;
+template void Checkpoint::check_layout(const Lattice<3>&) const;
+template void Checkpoint::fill(std::vector<Patch<2>>&, const std::vector<Body>&,
+                               const std::vector<SolverMaterial>&) const;
+template void Checkpoint::fill(std::vector<Patch<3>>&, const std::vector<Body>&,
+                               const std::vector<SolverMaterial>&) const;
+
+}  // namespace cairn

@@ -1,0 +1,187 @@
+#include <bit>
+#include <numeric>
+#include <type_traits>
+
+#include "cairn/io/checksum.hpp"
+#include "cairn/solver/checkpoint.hpp"
+#include "checkpoint_columns.hpp"
+
+namespace cairn {
+
+namespace {
+
+using namespace checkpoint;
+
+/// Writes columns in patch order and gathers the checksum of each patch's part of them.
+template <int Dim>
+class ColumnWriter {
+ public:
+  ColumnWriter(CheckpointWriter& writer, const std::vector<Patch<Dim>>& patches, std::size_t patch_count)
+      : writer_(writer), patches_(patches), one_each_(patch_count, 1), sums_(patches.size()) {}
+
+  /// `counts`: rows of every patch; `values`: of this rank's patches.
+  template <class T>
+  void write(const std::string& name, int components, const Counts& counts, const std::vector<T>& values) {
+    const std::span<const T> all(values);
+    writer_.write({name, components, all}, rows_of(patches_, counts));
+    std::size_t at = 0;
+    for (std::size_t p = 0; p < patches_.size(); ++p) {
+      const auto size = static_cast<std::size_t>(counts[patches_[p].id] * components);
+      sums_[p].push_back(std::bit_cast<std::int64_t>(checksum(all.subspan(at, size))));
+      at += size;
+    }
+    ++columns_;
+  }
+
+  /// Writes one number of every patch.
+  template <class T, class F>
+  void write_patches(const std::string& name, F&& value_of) {
+    std::vector<T> values;
+    for (const auto& patch : patches_) values.push_back(value_of(patch));
+    write(name, 1, one_each_, values);
+  }
+
+  void write_checksums() {
+    std::vector<std::int64_t> all;
+    for (const auto& sums : sums_) all.insert(all.end(), sums.begin(), sums.end());
+    writer_.write({checksums_name, columns_, std::span<const std::int64_t>(all)}, rows_of(patches_, one_each_));
+  }
+
+ private:
+  CheckpointWriter& writer_;
+  const std::vector<Patch<Dim>>& patches_;
+  Counts one_each_;                              // rows of tables with one row for each patch
+  std::vector<std::vector<std::int64_t>> sums_;  // for each patch, of each column
+  int columns_ = 0;
+};
+
+/// Points, pieces with points and contacts of every patch. Collective.
+template <int Dim>
+Layout layout_of(const Simulation<Dim>& simulation) {
+  const auto patches = static_cast<std::size_t>(simulation.lattice().patch_count());
+  Layout layout{Counts(patches, 0), Counts(patches, 0), Counts(patches, 0)};
+  for (const auto& patch : simulation.patches()) {
+    for_filled(patch, [&](const Piece<Dim>& piece) {
+      layout.points[patch.id] += piece.points.size(), ++layout.pieces[patch.id];
+    });
+    layout.contacts[patch.id] = std::ssize(patch.contacts);
+  }
+  for (Counts* counts : {&layout.points, &layout.pieces, &layout.contacts})
+    MPI_Allreduce(MPI_IN_PLACE, counts->data(), static_cast<int>(patches), MPI_INT64_T, MPI_SUM,
+                  simulation.communicator());
+  return layout;
+}
+
+template <int Dim>
+void write_patches(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patches, const Layout& layout) {
+  using P = Patch<Dim>;
+  out.template write_patches<std::int64_t>("patch_points", [&](const P& p) { return layout.points[p.id]; });
+  out.template write_patches<std::int64_t>("patch_pieces", [&](const P& p) { return layout.pieces[p.id]; });
+  out.template write_patches<std::int64_t>("patch_contacts", [&](const P& p) { return layout.contacts[p.id]; });
+  out.template write_patches<double>("contact_dissipation", [](const P& p) { return p.ledger.contact_dissipation; });
+  out.template write_patches<double>("boundary_work", [](const P& p) { return p.ledger.boundary_work; });
+  out.template write_patches<std::int64_t>("contact_nodes", [](const P& p) { return p.ledger.contact_nodes; });
+
+  std::vector<std::int32_t> body, states, pairs;
+  std::vector<std::int64_t> count;
+  std::vector<double> sums;
+  for (const P& patch : patches) {
+    for_filled(patch, [&](const Piece<Dim>& piece) {
+      body.push_back(piece.body), count.push_back(piece.points.size());
+      states.push_back(piece.points.columns() - PointColumns<Dim>::state);
+    });
+    for (const auto& [pair, sum] : patch.contacts) {
+      pairs.push_back(pair.first), pairs.push_back(pair.second);
+      sums.insert(sums.end(), sum.values.begin(), sum.values.end());
+    }
+  }
+  out.write("piece_body", 1, layout.pieces, body);
+  out.write("piece_points", 1, layout.pieces, count);
+  out.write("piece_states", 1, layout.pieces, states);
+  out.write("contact_bodies", 2, layout.contacts, pairs);
+  out.write("contact_sums", ContactSum<Dim>::size, layout.contacts, sums);
+}
+
+/// One quantity at a time, so that little memory is needed beside the points.
+template <int Dim>
+void write_points(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patches, const Layout& layout, int states) {
+  std::vector<std::int64_t> ids;
+  std::vector<std::int32_t> images;
+  for (const auto& patch : patches)
+    for_filled(patch, [&](const Piece<Dim>& piece) {
+      ids.insert(ids.end(), piece.points.ids().begin(), piece.points.ids().end());
+      for (const Image& image : piece.points.images())
+        images.insert(images.end(), image.begin(), image.begin() + image_components);
+    });
+  out.write("id", 1, layout.points, ids);
+  out.write("image", image_components, layout.points, images);
+  for (const Quantity& q : quantities<Dim>(states)) {
+    std::vector<double> values(ids.size() * static_cast<std::size_t>(q.components), 0.0);
+    double* to = values.data();
+    for (const auto& patch : patches)
+      for_filled(patch, [&](const Piece<Dim>& piece) {
+        const Points<Dim>& points = piece.points;
+        const int components = std::min(q.components, points.columns() - q.first);
+        for (int c = 0; c < components; ++c)
+          for (int p = 0; p < points.size(); ++p)
+            to[static_cast<std::ptrdiff_t>(p) * q.components + c] = points.column(q.first + c)[p];
+        to += static_cast<std::ptrdiff_t>(points.size()) * q.components;
+      });
+    out.write(q.name, q.components, layout.points, values);
+  }
+}
+
+void write_state(CheckpointWriter& writer, const RunState& state, MPI_Comm comm) {
+  for_each_number(state, [&]<class T>(const std::string& name, const T& value) {
+    if constexpr (std::is_same_v<T, std::uint64_t>)
+      writer.add(name, std::bit_cast<std::int64_t>(value));
+    else
+      writer.add(name, value);
+  });
+  std::vector<double> times;
+  std::string names;
+  for (const auto& entry : state.series) times.push_back(entry.time), names += entry.name + "\n";
+  RowBlocks rows{{}, std::ssize(times)};
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  if (rank == 0 && !times.empty()) rows.blocks.push_back({0, rows.total_rows});
+  if (rank != 0) times.clear();
+  writer.write({"series_time", 1, std::span<const double>(times)}, rows);
+  writer.add_text("series_names", names);
+}
+
+/// Bytes of all columns, a little more than they are.
+template <int Dim>
+std::int64_t bytes_of(const Layout& layout, int states, std::size_t texts) {
+  const auto sum = [](const Counts& counts) { return std::accumulate(counts.begin(), counts.end(), std::int64_t{0}); };
+  constexpr std::int64_t point = 8 + 4 * image_components, piece = 16, patch = 8 * 40;
+  return sum(layout.points) * (point + 8 * (PointColumns<Dim>::state + states)) + sum(layout.pieces) * piece +
+         sum(layout.contacts) * (8 + 8 * ContactSum<Dim>::size) + std::ssize(layout.points) * patch +
+         static_cast<std::int64_t>(texts);
+}
+
+}  // namespace
+
+template <int Dim>
+void write_checkpoint(const std::filesystem::path& file, const Simulation<Dim>& simulation, const RunState& state,
+                      const std::string& case_text) {
+  const MPI_Comm comm = simulation.communicator();
+  const auto& patches = simulation.patches();
+  const Layout layout = layout_of(simulation);
+  const int states = most_states(simulation.materials());
+  const std::int64_t bytes = bytes_of<Dim>(layout, states, case_text.size() + 64 * state.series.size());
+  CheckpointWriter writer(file, comm, bytes, simulation.total_points(), state.step.time, state.step.steps);
+  writer.add("dimension", std::int64_t{Dim});
+  write_state(writer, state, comm);
+  writer.add_text("case", case_text);
+  ColumnWriter<Dim> out(writer, patches, layout.points.size());
+  write_patches(out, patches, layout);
+  write_points(out, patches, layout, states);
+  out.write_checksums();
+  writer.finish();
+}
+
+template void write_checkpoint(const std::filesystem::path&, const Simulation<2>&, const RunState&, const std::string&);
+template void write_checkpoint(const std::filesystem::path&, const Simulation<3>&, const RunState&, const std::string&);
+
+}  // namespace cairn

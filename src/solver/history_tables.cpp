@@ -1,0 +1,95 @@
+#include "history_tables.hpp"
+
+#include <algorithm>
+
+#include "cairn/solver/body_states.hpp"
+
+namespace cairn {
+
+std::vector<std::string> history_columns(int dimension) {
+  std::vector<std::string> names = {"step",
+                                    "time",
+                                    "dt",
+                                    "kinetic_energy",
+                                    "strain_energy",
+                                    "potential_energy",
+                                    "plastic_dissipation",
+                                    "contact_dissipation",
+                                    "boundary_work",
+                                    "energy_error",
+                                    "momentum_x",
+                                    "momentum_y"};
+  if (dimension == 3) names.emplace_back("momentum_z");
+  names.insert(names.end(), {"contact_nodes", "mass"});
+  return names;
+}
+
+std::vector<std::string> body_columns(int dimension) {
+  if (dimension == 2) return {"step", "time", "body", "x", "y", "vx", "vy", "wz"};
+  return {"step", "time", "body", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"};
+}
+
+template <int Dim>
+void HistoryTables<Dim>::open(const RunState* from) {
+  const auto history = out_ / "history.csv", bodies = out_ / "bodies.csv";
+  const bool go_on = from != nullptr && std::filesystem::exists(history);
+  history_ =
+      go_on ? CsvWriter(history, history_columns(Dim), from->history_file) : CsvWriter(history, history_columns(Dim));
+  if (go_on && from->bodies_file.bytes > 0)
+    bodies_ = CsvWriter(bodies, body_columns(Dim), from->bodies_file);
+  else if (!track_.empty())
+    bodies_ = CsvWriter(bodies, body_columns(Dim));
+}
+
+template <int Dim>
+void HistoryTables<Dim>::note_positions(RunState& state) {
+  history_.flush(), bodies_.flush();
+  state.history_file = history_.position();
+  if (bodies_.position().bytes > 0) state.bodies_file = bodies_.position();
+}
+
+template <int Dim>
+void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t, double energy_error) {
+  std::vector<CsvValue> row = {simulation.steps(), simulation.time(), simulation.dt(), t.kinetic,
+                               t.strain,           t.potential,       t.plastic,       t.contact_dissipation,
+                               t.boundary_work,    energy_error};
+  for (int d = 0; d < Dim; ++d) row.emplace_back(t.momentum[d]);
+  row.emplace_back(static_cast<std::int64_t>(t.contact_nodes));
+  row.emplace_back(t.mass);
+  history_.add_row(row);  // nothing where the file is not open: on other ranks
+  if (!track_.empty()) add_bodies(simulation);
+}
+
+template <int Dim>
+void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
+  // Tracked bodies are few: each rank sends those it answers for to rank 0.
+  constexpr int width = 10;
+  const MPI_Comm comm = simulation.communicator();
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  std::vector<double> mine;
+  for (const BodyState& s : body_states(simulation))
+    if (std::find(track_.begin(), track_.end(), s.body) != track_.end()) {
+      mine.push_back(s.body);
+      for (const Vec3& v : {s.centre, s.velocity, s.angular_velocity}) mine.insert(mine.end(), v.data(), v.data() + 3);
+    }
+  std::vector<int> counts(ranks), starts(ranks, 0);
+  const int count = static_cast<int>(mine.size());
+  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
+  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
+  std::vector<double> all(rank == 0 ? starts.back() + counts.back() : 0);
+  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm);
+  for (std::size_t i = 0; i < all.size(); i += width) {
+    std::vector<CsvValue> row = {simulation.steps(), simulation.time(), static_cast<std::int64_t>(all[i])};
+    for (int group = 0; group < 3; ++group)
+      for (int d = 0; d < 3; ++d)
+        if (Dim == 3 || (group == 2) == (d == 2)) row.emplace_back(all[i + 1 + 3 * group + d]);
+    bodies_.add_row(row);
+  }
+}
+
+template class HistoryTables<2>;
+template class HistoryTables<3>;
+
+}  // namespace cairn

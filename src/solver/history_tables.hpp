@@ -1,0 +1,41 @@
+#pragma once
+/// history.csv and bodies.csv of a run, written by rank 0.
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cairn/io/history.hpp"
+#include "cairn/solver/run_state.hpp"
+
+namespace cairn {
+
+std::vector<std::string> history_columns(int dimension);
+std::vector<std::string> body_columns(int dimension);
+
+template <int Dim>
+class HistoryTables {
+ public:
+  /// `track`: bodies of bodies.csv.
+  HistoryTables(std::filesystem::path out, std::vector<int> track) : out_(std::move(out)), track_(std::move(track)) {}
+
+  /// Creates the files; or, where history.csv is there and `from` is given, goes on with them. Rank 0 only.
+  void open(const RunState* from);
+
+  /// Adds one row to history.csv and one for each tracked body to bodies.csv. Collective.
+  void add(const Simulation<Dim>& simulation, const Totals& totals, double energy_error);
+
+  /// Has the files flushed to disk, and notes how far they go.
+  void note_positions(RunState& state);
+  /// The first error, empty if there was none.
+  const std::string& error() const { return history_.error().empty() ? bodies_.error() : history_.error(); }
+
+ private:
+  void add_bodies(const Simulation<Dim>& simulation);
+
+  std::filesystem::path out_;
+  std::vector<int> track_;
+  CsvWriter history_, bodies_;
+};
+
+}  // namespace cairn
