@@ -31,10 +31,11 @@ std::vector<fs::path> make_folder(const fs::path& out) {
 void check_free(const fs::path& out) {
   const auto results = find_results(out);
   if (results.empty()) return;
-  throw InputError(fmt::format("--out: {}: holds results already ({}{}); choose another folder, or add --overwrite to "
-                               "remove them",
-                               out.string(), results[0].filename().string(),
-                               results.size() > 1 ? fmt::format(" and {} more", results.size() - 1) : ""));
+  throw InputError(
+      fmt::format("--out: {}: holds results already ({}{}); choose another folder, or add --overwrite to "
+                  "remove them",
+                  out.string(), results[0].filename().string(),
+                  results.size() > 1 ? fmt::format(" and {} more", results.size() - 1) : ""));
 }
 
 /// A word as a shell reads it back.
@@ -51,7 +52,8 @@ std::string command_line(const RunArguments& arguments, const fs::path& out) {
   int ranks = 1;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   std::string text = ranks > 1 ? fmt::format("mpirun -n {} ", ranks) : "";
-  text += fmt::format("{} run {} --out {} ", quoted(arguments.program), quoted(arguments.file.string()), quoted(out.string()));
+  text += fmt::format("{} run {} --out {} ", quoted(arguments.program), quoted(arguments.file.string()),
+                      quoted(out.string()));
   for (const auto& [key, value] : arguments.overrides) text += fmt::format("--set {} ", quoted(key + "=" + value));
   return text;
 }

@@ -22,7 +22,8 @@ void Points<Dim>::reallocate(int capacity) {
   capacity = whole_lanes(capacity);
   AlignedDoubles moved(static_cast<std::size_t>(capacity) * columns_);
   std::fill(moved.begin(), moved.end(), 0.0);
-  for (int c = 0; c < columns_; ++c) std::copy_n(column(c), size_, moved.data() + static_cast<std::size_t>(c) * capacity);
+  for (int c = 0; c < columns_; ++c)
+    std::copy_n(column(c), size_, moved.data() + static_cast<std::size_t>(c) * capacity);
   data_.swap(moved);
   capacity_ = capacity;
   ids_.reserve(capacity);

@@ -5,7 +5,8 @@ namespace {
 
 /// Calls f(d, side, plane) for every face of the wanted type on which the patch lies; plane is the face's node.
 template <int Dim, class F>
-void for_faces(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces, FaceType type, F&& f) {
+void for_faces(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces, FaceType type,
+               F&& f) {
   for (int d = 0; d < Dim; ++d)
     for (int side = 0; side < 2; ++side) {
       const int plane = side == 0 ? 0 : lattice.cells()[d];
@@ -17,8 +18,10 @@ void for_faces(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceC
 /// The nodes of `box` on the face and beyond.
 template <int Dim>
 Box<Dim> at_face(Box<Dim> box, int d, int side, int plane) {
-  if (side == 0) box.upper[d] = std::min(box.upper[d], plane + 1);
-  else box.lower[d] = std::max(box.lower[d], plane);
+  if (side == 0)
+    box.upper[d] = std::min(box.upper[d], plane + 1);
+  else
+    box.lower[d] = std::max(box.lower[d], plane);
   return box;
 }
 
@@ -90,7 +93,8 @@ void mirror_sums(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceCondi
   });
   mirror<Dim>(patch, lattice, faces, &NodeBox<Dim>::extras, NodeExtras<Dim>::width, [](int d, std::vector<bool>& odd) {
     odd[NodeExtras<Dim>::position + d] = true;
-    if (Dim == 2) odd[2] = true;  // xy
+    if (Dim == 2)
+      odd[2] = true;  // xy
     else
       for (int shear = 0; shear < 3; ++shear)  // xy, yz, xz
         odd[3 + shear] = d == shear || d == (shear + 1) % 3;
@@ -109,14 +113,15 @@ void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Fa
                         const std::vector<Body>& bodies, bool close_ledger) {
   for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
                        [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
-    auto velocity = vector_of<Dim>(piece.nodes.velocity, node);
-    if (close_ledger && lattice.owns_node(patch.id, place)) {
-      const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
-      const Vec<Dim> momentum = momentum_of(piece, node), change = mass * face.velocity - momentum;
-      patch.ledger.contact_dissipation += change.dot(face.velocity - 0.5 * (momentum / mass + velocity));
-    }
-    velocity = face.velocity;
-  });
+                         auto velocity = vector_of<Dim>(piece.nodes.velocity, node);
+                         if (close_ledger && lattice.owns_node(patch.id, place)) {
+                           const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
+                           const Vec<Dim> momentum = momentum_of(piece, node), change = mass * face.velocity - momentum;
+                           patch.ledger.contact_dissipation +=
+                               change.dot(face.velocity - 0.5 * (momentum / mass + velocity));
+                         }
+                         velocity = face.velocity;
+                       });
 }
 
 template <int Dim>
@@ -125,17 +130,18 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
   using M = NodeMotion<Dim>;
   for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
                        [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
-    const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
-    double* motion = piece.nodes.motion.data() + static_cast<std::size_t>(node) * M::width;
-    Eigen::Map<Vec<Dim>> velocity(motion + M::velocity), acceleration(motion + M::acceleration);
-    const Vec<Dim> before = momentum_of(piece, node) / mass;
-    const Vec<Dim> impulse = mass * (face.velocity - velocity);
-    velocity = face.velocity;
-    acceleration = (face.velocity - before) / dt;
-    if (!lattice.owns_node(patch.id, place)) return;
-    patch.ledger.boundary_work += impulse.dot(face.velocity);
-    if (close_ledger) patch.ledger.contact_dissipation += 0.5 * mass * (face.velocity - before).squaredNorm();
-  });
+                         const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
+                         double* motion = piece.nodes.motion.data() + static_cast<std::size_t>(node) * M::width;
+                         Eigen::Map<Vec<Dim>> velocity(motion + M::velocity), acceleration(motion + M::acceleration);
+                         const Vec<Dim> before = momentum_of(piece, node) / mass;
+                         const Vec<Dim> impulse = mass * (face.velocity - velocity);
+                         velocity = face.velocity;
+                         acceleration = (face.velocity - before) / dt;
+                         if (!lattice.owns_node(patch.id, place)) return;
+                         patch.ledger.boundary_work += impulse.dot(face.velocity);
+                         if (close_ledger)
+                           patch.ledger.contact_dissipation += 0.5 * mass * (face.velocity - before).squaredNorm();
+                       });
 }
 
 template <int Dim>
@@ -167,8 +173,16 @@ void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice
           const int node = box.offset(place);
           const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(node) * N::width;
           if (!(sums[N::mass] > 0)) continue;
-          entries_.push_back({static_cast<int>(k), node, 2 * d + side, first, sums[N::mass], filled,
-                              lattice.owns_node(patch.id, place), {}, faces[2 * d + side].friction[bodies[piece.body].material], {}});
+          entries_.push_back({static_cast<int>(k),
+                              node,
+                              2 * d + side,
+                              first,
+                              sums[N::mass],
+                              filled,
+                              lattice.owns_node(patch.id, place),
+                              {},
+                              faces[2 * d + side].friction[bodies[piece.body].material],
+                              {}});
         }
       });
     }
@@ -185,7 +199,8 @@ Vec<Dim> WallContact<Dim>::impulse(const Entry& entry, const Vec<Dim>& momentum,
   if (entry.law.law == ContactLaw::none || entry.law.law == ContactLaw::stick) return -P;
   // Stress at a wall is one-sided, so that both papers' releases reduce to approach there.
   if (settings.options.release != Release::reaction) return approach_impulse<Dim>(P, n, entry.law.friction);
-  return second ? reaction_impulse<Dim>(P, n, entry.decision, entry.law.friction) : hold_impulse<Dim>(P, n, entry.decision);
+  return second ? reaction_impulse<Dim>(P, n, entry.decision, entry.law.friction)
+                : hold_impulse<Dim>(P, n, entry.decision);
 }
 
 template <int Dim>
@@ -195,7 +210,8 @@ void WallContact<Dim>::first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& 
     Entry& entry = entries_[e];
     Piece<Dim>& piece = patch.pieces[entry.piece];
     auto momentum = momentum_of(piece, entry.node);
-    if (entry.on_wall != static_cast<int>(e)) entry.decision = entries_[entry.on_wall].decision;
+    if (entry.on_wall != static_cast<int>(e))
+      entry.decision = entries_[entry.on_wall].decision;
     else if (entry.open) {
       Vec<Dim> n = Vec<Dim>::Zero();
       n[entry.face / 2] = entry.face % 2 == 0 ? -1 : 1;
@@ -237,20 +253,22 @@ void WallContact<Dim>::repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>&
 }
 
 template <int Dim>
-void WallContact<Dim>::keep_ledger(const Entry& entry, Patch<Dim>& patch, const FaceConditions<Dim>& faces, double given) const {
+void WallContact<Dim>::keep_ledger(const Entry& entry, Patch<Dim>& patch, const FaceConditions<Dim>& faces,
+                                   double given) const {
   if (!entry.owned) return;
   const double work = entry.record.second.dot(faces[entry.face].velocity);
   patch.ledger.boundary_work += work;
   patch.ledger.contact_dissipation += work - given;
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                          \
-  template void mirror_sums(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);                              \
-  template void mirror_vectors(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, AlignedDoubles NodeBox<Dim>::*); \
-  template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&, \
-                                   bool);                                                                               \
-  template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, const std::vector<Body>&, \
-                                 double, bool);                                                                         \
+#define CAIRN_INSTANTIATE(Dim)                                                                   \
+  template void mirror_sums(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);       \
+  template void mirror_vectors(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,     \
+                               AlignedDoubles NodeBox<Dim>::*);                                  \
+  template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, \
+                                   const std::vector<Body>&, bool);                              \
+  template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,   \
+                                 const std::vector<Body>&, double, bool);                        \
   template class WallContact<Dim>;
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

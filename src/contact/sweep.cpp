@@ -12,7 +12,8 @@ using Node = Eigen::Map<Vec<Dim>>;
 
 template <int Dim>
 Node<Dim> momentum_of(Piece<Dim>& piece, int node) {
-  return Node<Dim>(piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width + NodeSums<Dim>::momentum);
+  return Node<Dim>(piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width +
+                   NodeSums<Dim>::momentum);
 }
 
 template <int Dim>
@@ -124,8 +125,8 @@ void ContactSweep<Dim>::prepare(SharedNode& node, const Patch<Dim>& patch, const
       // On a symmetry plane sums hold both halves; beyond it they are the image of those inside.
       if (face == FaceType::symmetry) node.share *= place[d] == 0 || place[d] == lattice.cells()[d] ? 0.5 : 0.0;
     }
-  const bool filled = volume_[box_.offset(place)] >= settings.options.fill * room ||
-                      settings.options.release != Release::reaction;
+  const bool filled =
+      volume_[box_.offset(place)] >= settings.options.fill * room || settings.options.release != Release::reaction;
   double total = 0;
   for (int i = 0; i < node.count; ++i) {
     total += entry[i].mass;
@@ -162,8 +163,10 @@ void ContactSweep<Dim>::set_normals(const SharedNode& node, const Patch<Dim>& pa
     Vec<Dim> g = gradient(entry[i]);
     if (choice == NormalChoice::common && partner_flatness > flatness(entry[i], g)) g = -of_partner;
     const double size = g.norm();
-    if (size > 0) entry[i].normal = g / size;
-    else if (!merges(entry[i].law.law)) entry[i].open = false;
+    if (size > 0)
+      entry[i].normal = g / size;
+    else if (!merges(entry[i].law.law))
+      entry[i].open = false;
   }
 }
 
@@ -178,11 +181,14 @@ void ContactSweep<Dim>::set_gates(const SharedNode& node, const Patch<Dim>& patc
     const auto& all = patch.pieces[e.piece].nodes.extras;
     return all.empty() ? nullptr : all.data() + static_cast<std::size_t>(e.node) * E::width;
   };
-  const auto volume = [&](const ContactEntry<Dim>& e) { return sums_at(patch.pieces[e.piece], e.node)[NodeSums<Dim>::volume]; };
+  const auto volume = [&](const ContactEntry<Dim>& e) {
+    return sums_at(patch.pieces[e.piece], e.node)[NodeSums<Dim>::volume];
+  };
   const auto traction = [&](const ContactEntry<Dim>& e, const Vec<Dim>& n) {
     const double* s = extras(e);
     if (s == nullptr) return 0.0;
-    if constexpr (Dim == 2) return n[0] * n[0] * s[0] + n[1] * n[1] * s[1] + 2 * n[0] * n[1] * s[2];
+    if constexpr (Dim == 2)
+      return n[0] * n[0] * s[0] + n[1] * n[1] * s[1] + 2 * n[0] * n[1] * s[2];
     else
       return n[0] * n[0] * s[0] + n[1] * n[1] * s[1] + n[2] * n[2] * s[2] +
              2 * (n[0] * n[1] * s[3] + n[1] * n[2] * s[4] + n[0] * n[2] * s[5]);
@@ -202,7 +208,8 @@ void ContactSweep<Dim>::set_gates(const SharedNode& node, const Patch<Dim>& patc
     if (options.separation > 0 && i != node.partner && extras(entry[i]) != nullptr && extras(partner) != nullptr) {
       const Vec<Dim> mine = ConstNode<Dim>(extras(entry[i]) + E::position) / volume(entry[i]);
       const Vec<Dim> theirs = ConstNode<Dim>(extras(partner) + E::position) / volume(partner);
-      if ((theirs - mine).dot(entry[i].normal) >= options.separation * lattice.smallest_spacing()) entry[i].open = false;
+      if ((theirs - mine).dot(entry[i].normal) >= options.separation * lattice.smallest_spacing())
+        entry[i].open = false;
     }
   }
 }
@@ -215,11 +222,13 @@ Vec<Dim> ContactSweep<Dim>::impulse(ContactEntry<Dim>& entry, const Vec<Dim>& P,
   if (merges(entry.law.law)) return -P;
   const double mu = entry.law.friction;
   switch (settings.options.release) {
-    case Release::approach: return approach_impulse<Dim>(P, entry.normal, mu);
+    case Release::approach:
+      return approach_impulse<Dim>(P, entry.normal, mu);
     case Release::traction:
       return traction_impulse<Dim>(P, entry.normal, mu, entry.compressive, entry.stress_free,
                                    settings.options.departing_friction);
-    case Release::reaction: break;
+    case Release::reaction:
+      break;
   }
   if (pass == Pass::first) entry.decision = decide_by_reaction<Dim>(P, F, entry.normal, mu, dt);
   if (pass == Pass::second) return reaction_impulse<Dim>(P, entry.normal, entry.decision, mu);
@@ -227,8 +236,8 @@ Vec<Dim> ContactSweep<Dim>::impulse(ContactEntry<Dim>& entry, const Vec<Dim>& P,
 }
 
 template <int Dim>
-void ContactSweep<Dim>::resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                                double dt, Pass pass) {
+void ContactSweep<Dim>::resolve(const SharedNode& node, const Lattice<Dim>& lattice,
+                                const ContactSettings<Dim>& settings, double dt, Pass pass) {
   ContactEntry<Dim>* entry = &entries_[node.first];
   const auto& partner = entry[node.partner];
   double mass = 0;
@@ -283,8 +292,8 @@ void ContactSweep<Dim>::first_pass(Patch<Dim>& patch, const Lattice<Dim>& lattic
 }
 
 template <int Dim>
-void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                                    double dt, bool last) {
+void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                    const ContactSettings<Dim>& settings, double dt, bool last) {
   const bool only_first = settings.options.passes == Passes::before;
   patch.ledger.contact_nodes = 0;
   for (const auto& node : shared_) {
@@ -311,8 +320,8 @@ void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& latti
 }
 
 template <int Dim>
-void ContactSweep<Dim>::repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                                    double dt) {
+void ContactSweep<Dim>::repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                    const ContactSettings<Dim>& settings, double dt) {
   for (const auto& node : shared_) {
     load_node(node, patch, Pass::repeat, dt);
     resolve(node, lattice, settings, dt, Pass::repeat);

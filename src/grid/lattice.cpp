@@ -88,8 +88,10 @@ std::vector<Link<Dim>> Lattice<Dim>::unpaired_links(int patch) const {
     for (int d = 0; d < Dim; ++d) {
       other[d] = position[d] + step[d];
       exists = exists || step[d] != 0;
-      if (other[d] < 0) link.shift[d] = -cells_[d], other[d] += patches_[d];
-      else if (other[d] >= patches_[d]) link.shift[d] = cells_[d], other[d] -= patches_[d];
+      if (other[d] < 0)
+        link.shift[d] = -cells_[d], other[d] += patches_[d];
+      else if (other[d] >= patches_[d])
+        link.shift[d] = cells_[d], other[d] -= patches_[d];
       if (link.shift[d] != 0 && !periodic_[d]) return;
     }
     if (!exists) return;

@@ -224,7 +224,8 @@ bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& 
            (!drive.group.empty() && body.group == drive.group);
   const Bounds b = bounds(body.shape);
   const int k = drive.overlapping / 2;
-  return drive.overlapping % 2 ? b.upper[k] > domain.upper[k] - drive.within : b.lower[k] < domain.lower[k] + drive.within;
+  return drive.overlapping % 2 ? b.upper[k] > domain.upper[k] - drive.within
+                               : b.lower[k] < domain.lower[k] + drive.within;
 }
 
 }  // namespace cairn

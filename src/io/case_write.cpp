@@ -181,7 +181,8 @@ void write_bodies(Writer& out, const Draft& draft) {
   for (const auto& drive : c.drives) {
     out.section("[[drive]]");
     if (drive.overlapping >= 0) {
-      out.raw("bodies", fmt::format("{{ overlapping = \"{}\", within = {} }}", face_names[drive.overlapping], text_of(drive.within)));
+      out.raw("bodies", fmt::format("{{ overlapping = \"{}\", within = {} }}", face_names[drive.overlapping],
+                                    text_of(drive.within)));
     } else if (!drive.group.empty()) {
       out.raw("bodies", "{ group = " + text_of(drive.group) + " }");
     } else {

@@ -190,11 +190,12 @@ std::string describe_checkpoint(hid_t root) {
   std::string written;
   for (const char* kind : {"history", "particles", "grains", "contacts", "checkpoint"})
     written += fmt::format("{}{} {}", written.empty() ? "" : ", ", number(std::string(kind) + "_count"), kind);
-  return fmt::format("{} points in {} pieces of bodies in {} patches, {}D; last dt {} s, energy error {:.3g}\n"
-                     "outputs written so far: {}; history.csv was {} bytes long\n"
-                     "go on with: cairn run CASE.toml --out DIR --restart FILE\n",
-                     number("rows"), rows("piece_body"), rows("patch_points"), number("dimension"), number("dt"),
-                     number("energy_error"), written, number("history_bytes"));
+  return fmt::format(
+      "{} points in {} pieces of bodies in {} patches, {}D; last dt {} s, energy error {:.3g}\n"
+      "outputs written so far: {}; history.csv was {} bytes long\n"
+      "go on with: cairn run CASE.toml --out DIR --restart FILE\n",
+      number("rows"), rows("piece_body"), rows("patch_points"), number("dimension"), number("dt"),
+      number("energy_error"), written, number("history_bytes"));
 }
 
 /// The attributes of the root that a file of this program has, where it has them.

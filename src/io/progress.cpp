@@ -37,8 +37,8 @@ std::string format_progress(const Progress& p) {
 
 namespace {
 
-/// True where a person watches the stream. Under Open MPI rank 0 always writes to a terminal of mpirun's own making: what
-/// counts is where mpirun, the parent, writes to.
+/// True where a person watches the stream. Under Open MPI rank 0 always writes to a terminal of mpirun's own making:
+/// what counts is where mpirun, the parent, writes to.
 bool is_watched(std::FILE* stream) {
   if (::isatty(::fileno(stream)) != 1) return false;
   if (std::getenv("OMPI_COMM_WORLD_SIZE") == nullptr) return true;

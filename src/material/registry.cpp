@@ -1,8 +1,8 @@
 #include "cairn/material/registry.hpp"
 
-#include "cairn/core/error.hpp"
-
 #include <array>
+
+#include "cairn/core/error.hpp"
 
 namespace cairn {
 namespace {

@@ -1,9 +1,9 @@
 #include "cairn/parallel/balance.hpp"
 
-#include "cairn/parallel/communicator.hpp"
-
 #include <algorithm>
 #include <bit>
+
+#include "cairn/parallel/communicator.hpp"
 
 namespace cairn {
 namespace {
@@ -14,7 +14,8 @@ template <int Dim>
 void put_piece(const Piece<Dim>& piece, Message& message) {
   const Points<Dim>& points = piece.points;
   for (std::int64_t value : {piece.body, points.size(), points.columns()}) message.put(value);
-  for (int c = 0; c < points.columns(); ++c) std::copy_n(points.column(c), points.size(), message.extend(points.size()));
+  for (int c = 0; c < points.columns(); ++c)
+    std::copy_n(points.column(c), points.size(), message.extend(points.size()));
   for (auto id : points.ids()) message.put(id);
   for (const auto& image : points.images()) message.put(std::bit_cast<std::int64_t>(image));
 }
@@ -31,8 +32,8 @@ void put_patch(const Patch<Dim>& patch, Message& message) {
     message.put(std::int64_t{pair.first}), message.put(std::int64_t{pair.second});
     for (double value : sum.values) message.put(value);
   }
-  message.put(static_cast<std::int64_t>(
-      std::count_if(patch.pieces.begin(), patch.pieces.end(), [](const auto& piece) { return piece.points.size() > 0; })));
+  message.put(static_cast<std::int64_t>(std::count_if(patch.pieces.begin(), patch.pieces.end(),
+                                                      [](const auto& piece) { return piece.points.size() > 0; })));
   for (const auto& piece : patch.pieces)
     if (piece.points.size() > 0) put_piece(piece, message);
 }
@@ -80,7 +81,8 @@ std::vector<int> keep_in_place(const std::vector<int>& parts, const std::vector<
     for (int b = 0; b < ranks; ++b) overlaps[static_cast<std::size_t>(a) * ranks + b] = {0, a, b};
   for (std::size_t p = 0; p < parts.size(); ++p)
     overlaps[static_cast<std::size_t>(parts[p]) * ranks + owner[p]].work += 1 + work[p];
-  std::stable_sort(overlaps.begin(), overlaps.end(), [](const Overlap& a, const Overlap& b) { return a.work > b.work; });
+  std::stable_sort(overlaps.begin(), overlaps.end(),
+                   [](const Overlap& a, const Overlap& b) { return a.work > b.work; });
   std::vector<int> rank_of(ranks, -1);
   std::vector<bool> taken(ranks, false);
   for (const auto& o : overlaps)
@@ -125,7 +127,9 @@ void move_patches(std::vector<Patch<Dim>>& patches, std::vector<int>& owner, con
   owner = new_owner;
 }
 
-template void move_patches(std::vector<Patch<2>>&, std::vector<int>&, const std::vector<int>&, const Lattice<2>&, MPI_Comm);
-template void move_patches(std::vector<Patch<3>>&, std::vector<int>&, const std::vector<int>&, const Lattice<3>&, MPI_Comm);
+template void move_patches(std::vector<Patch<2>>&, std::vector<int>&, const std::vector<int>&, const Lattice<2>&,
+                           MPI_Comm);
+template void move_patches(std::vector<Patch<3>>&, std::vector<int>&, const std::vector<int>&, const Lattice<3>&,
+                           MPI_Comm);
 
 }  // namespace cairn

@@ -1,9 +1,9 @@
 #include "cairn/parallel/communicator.hpp"
 
-#include "cairn/core/error.hpp"
-
 #include <algorithm>
 #include <limits>
+
+#include "cairn/core/error.hpp"
 
 namespace cairn {
 namespace {
@@ -13,7 +13,10 @@ constexpr int exchange_tag = 11;
 }  // namespace
 
 NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours)
-    : comm_(comm), neighbours_(std::move(neighbours)), outgoing_(neighbours_.size() + 1), incoming_(neighbours_.size()) {
+    : comm_(comm),
+      neighbours_(std::move(neighbours)),
+      outgoing_(neighbours_.size() + 1),
+      incoming_(neighbours_.size()) {
   MPI_Comm_rank(comm_, &rank_);
 }
 
@@ -40,7 +43,8 @@ void NeighbourExchange::start() {
     auto& words = outgoing_[i].words();
     if (words.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
       throw RunError("a message to a neighbour exceeds 16 GiB: use more ranks");
-    MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], exchange_tag, comm_, &requests_[i]);
+    MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], exchange_tag, comm_,
+              &requests_[i]);
     ++traffic_.messages;
     traffic_.bytes += static_cast<std::int64_t>(words.size()) * 8;
   }

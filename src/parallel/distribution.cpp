@@ -1,8 +1,8 @@
 #include "cairn/parallel/distribution.hpp"
 
-#include "cairn/core/error.hpp"
-
 #include <metis.h>
+
+#include "cairn/core/error.hpp"
 
 namespace cairn {
 namespace {
@@ -15,7 +15,8 @@ struct Graph {
 template <int Dim>
 Graph build_graph(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& work) {
   Graph graph;
-  // METIS adds weights in idx_t: scale so that sums stay far from its range. One more for each patch spreads empty ones.
+  // METIS adds weights in idx_t: scale so that sums stay far from its range. One more for each patch spreads empty
+  // ones.
   std::int64_t total = 0;
   for (auto w : work) total += w;
   const std::int64_t unit = 1 + total / (std::int64_t{1} << 28);
@@ -23,9 +24,12 @@ Graph build_graph(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& 
     std::vector<std::pair<int, std::size_t>> shared;
     for (const auto& link : lattice.links(patch)) {
       if (link.patch == patch) continue;
-      const auto nodes = intersection(lattice.patch_nodes(patch), lattice.patch_nodes(link.patch).shifted(link.shift)).size();
-      if (!shared.empty() && shared.back().first == link.patch) shared.back().second += nodes;
-      else shared.emplace_back(link.patch, nodes);
+      const auto nodes =
+          intersection(lattice.patch_nodes(patch), lattice.patch_nodes(link.patch).shifted(link.shift)).size();
+      if (!shared.empty() && shared.back().first == link.patch)
+        shared.back().second += nodes;
+      else
+        shared.emplace_back(link.patch, nodes);
     }
     for (const auto& [neighbour, nodes] : shared) {
       graph.neighbours.push_back(neighbour);
@@ -57,8 +61,9 @@ std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vect
   options[METIS_OPTION_UFACTOR] = 20;  // imbalance up to 1.02
   std::vector<idx_t> part(patches, 0);
   const auto method = ranks <= 8 ? METIS_PartGraphRecursive : METIS_PartGraphKway;
-  const int status = method(&vertices, &constraints, graph.starts.data(), graph.neighbours.data(), graph.vertex_weights.data(),
-                            nullptr, graph.edge_weights.data(), &parts, nullptr, nullptr, options, &cut, part.data());
+  const int status =
+      method(&vertices, &constraints, graph.starts.data(), graph.neighbours.data(), graph.vertex_weights.data(),
+             nullptr, graph.edge_weights.data(), &parts, nullptr, nullptr, options, &cut, part.data());
   if (status != METIS_OK) throw RunError("METIS could not partition the patches");
   std::copy(part.begin(), part.end(), owner.begin());
   return owner;

@@ -1,11 +1,11 @@
 #include "cairn/parallel/migration.hpp"
 
-#include "cairn/core/error.hpp"
-
 #include <fmt/format.h>
 
 #include <bit>
 #include <numeric>
+
+#include "cairn/core/error.hpp"
 
 namespace cairn {
 namespace {
@@ -38,7 +38,8 @@ Index<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& latt
       return !(lattice.scaled(d, x) >= -margin && lattice.scaled(d, x) < lattice.cells()[d] + margin);
     };
     if (lattice.periodic(d) && x - x == 0) {
-      // Twice: a position a rounding error below the domain may wrap to just its upper end, which is its lower end again.
+      // Twice: a position a rounding error below the domain may wrap to just its upper end, which is its lower end
+      // again.
       for (int turn = 0; turn < 2 && outside(); ++turn) {
         const int direction = lattice.scaled(d, x) < 0 ? 1 : -1;
         x += direction * lattice.length(d);
@@ -46,8 +47,8 @@ Index<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& latt
       }
     }
     if (outside()) {
-      failure = fmt::format("point {} of body {} left the domain: {} = {:.6g} m, velocity {:.6g} m/s there", points.ids()[p],
-                            body, "xyz"[d], x, points.column(PointColumns<Dim>::velocity + d)[p]);
+      failure = fmt::format("point {} of body {} left the domain: {} = {:.6g} m, velocity {:.6g} m/s there",
+                            points.ids()[p], body, "xyz"[d], x, points.column(PointColumns<Dim>::velocity + d)[p]);
       return cell;
     }
     cell[d] = std::clamp(static_cast<int>(std::floor(lattice.scaled(d, x))), 0, lattice.cells()[d] - 1);
@@ -66,12 +67,15 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
   for (int p = 0; p < points.size(); ++p) {
     std::string failure;
     const int to = lattice.patch_of_cell(locate(points, p, piece.body, lattice, failure));
-    const bool near = std::any_of(patch.links.begin(), patch.links.end(), [&](const auto& link) { return link.patch == to; });
+    const bool near =
+        std::any_of(patch.links.begin(), patch.links.end(), [&](const auto& link) { return link.patch == to; });
     if (failure.empty() && to != patch.id && !near)
       failure = fmt::format("point {} of body {} crossed more than a patch in one step", points.ids()[p], piece.body);
     if (failure_.empty()) failure_ = failure;
-    if (to == patch.id || !failure.empty()) staying.push_back(p);
-    else leaving.emplace_back(to, p);
+    if (to == patch.id || !failure.empty())
+      staying.push_back(p);
+    else
+      leaving.emplace_back(to, p);
   }
   std::stable_sort(leaving.begin(), leaving.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (std::size_t i = 0; i < leaving.size();) {
@@ -121,10 +125,12 @@ void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
   };
   read(messages_.rank());
   for (int rank : messages_.neighbours()) read(rank);
-  std::stable_sort(arrivals.begin(), arrivals.end(),
-                   [](const Arrival& a, const Arrival& b) { return std::pair(a.to, a.from) < std::pair(b.to, b.from); });
+  std::stable_sort(arrivals.begin(), arrivals.end(), [](const Arrival& a, const Arrival& b) {
+    return std::pair(a.to, a.from) < std::pair(b.to, b.from);
+  });
   for (const Arrival& a : arrivals) {
-    auto patch = std::lower_bound(patches.begin(), patches.end(), a.to, [](const auto& p, int id) { return p.id < id; });
+    auto patch =
+        std::lower_bound(patches.begin(), patches.end(), a.to, [](const auto& p, int id) { return p.id < id; });
     Points<Dim>& points = patch->piece_of(a.body, 0).points;
     if (points.size() == 0) points = Points<Dim>(a.columns - PointColumns<Dim>::state);
     const Message& message = messages_.incoming(a.rank);
@@ -145,7 +151,9 @@ void sort_by_cell(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Box<Dim>
   std::vector<int> key(points.size()), order(points.size());
   for (int p = 0; p < points.size(); ++p) {
     Index<Dim> cell;
-    for (int d = 0; d < Dim; ++d) cell[d] = std::clamp(static_cast<int>(std::floor(lattice.scaled(d, points.column(d)[p]))), cells.lower[d], cells.upper[d] - 1);
+    for (int d = 0; d < Dim; ++d)
+      cell[d] = std::clamp(static_cast<int>(std::floor(lattice.scaled(d, points.column(d)[p]))), cells.lower[d],
+                           cells.upper[d] - 1);
     key[p] = cells.offset(cell);
   }
   std::iota(order.begin(), order.end(), 0);

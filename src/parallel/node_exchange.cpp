@@ -10,7 +10,8 @@ template <int Dim>
 void pack(const NodeBox<Dim>& nodes, const Box<Dim>& box, const NodeQuantity<Dim>& q, double* to) {
   const double* values = (nodes.*q.values).data();
   for_each_row(box, nodes.box, [&](int first, int n) {
-    for (int i = 0; i < n; ++i, to += q.used) std::copy_n(values + static_cast<std::size_t>(first + i) * q.width, q.used, to);
+    for (int i = 0; i < n; ++i, to += q.used)
+      std::copy_n(values + static_cast<std::size_t>(first + i) * q.width, q.used, to);
   });
 }
 
@@ -48,7 +49,8 @@ void NodeExchange<Dim>::start_sums(std::vector<Patch<Dim>>& patches, bool extras
         message.put(std::int64_t{link.patch});
         message.put(std::int64_t{link.mirror});
         message.put(std::int64_t{piece.body});
-        for (int d = 0; d < Dim; ++d) message.put(std::int64_t{theirs.lower[d]}), message.put(std::int64_t{theirs.upper[d]});
+        for (int d = 0; d < Dim; ++d)
+          message.put(std::int64_t{theirs.lower[d]}), message.put(std::int64_t{theirs.upper[d]});
         for (const auto& q : quantities_) pack(piece.nodes, box, q, message.extend(box.size() * q.used));
       }
     }
@@ -91,8 +93,9 @@ void NodeExchange<Dim>::add_parts(Patch<Dim>& patch, std::vector<Part>& parts) {
             [](const Part& a, const Part& b) { return std::pair(a.body, a.link) < std::pair(b.body, b.link); });
   // Ghosts of the step before that nobody speaks of any more go; new ones come.
   std::erase_if(patch.pieces, [&](const Piece<Dim>& piece) {
-    return piece.points.size() == 0 && !std::binary_search(parts.begin(), parts.end(), Part{0, piece.body, {}, 0, 0},
-                                                           [](const Part& a, const Part& b) { return a.body < b.body; });
+    return piece.points.size() == 0 &&
+           !std::binary_search(parts.begin(), parts.end(), Part{0, piece.body, {}, 0, 0},
+                               [](const Part& a, const Part& b) { return a.body < b.body; });
   });
   for (std::size_t i = 0; i < parts.size();) {
     std::size_t end = i;
@@ -181,8 +184,8 @@ void NodeExchange<Dim>::sum(std::vector<Patch<Dim>>& patches, AlignedDoubles Nod
     for (std::size_t i = 0; i < parts_[p].size();) {
       std::size_t end = i;
       while (end < parts_[p].size() && parts_[p][end].body == parts_[p][i].body) ++end;
-      add_to_piece(patches[p].piece_of(parts_[p][i].body, 0), patches[p].links_before, &parts_[p][i], &parts_[p][i] + (end - i),
-                   quantity, false);
+      add_to_piece(patches[p].piece_of(parts_[p][i].body, 0), patches[p].links_before, &parts_[p][i],
+                   &parts_[p][i] + (end - i), quantity, false);
       i = end;
     }
 }

@@ -34,8 +34,8 @@ std::vector<double> send_home(const std::vector<double>& records, int width, con
   MPI_Alltoall(send.data(), 1, MPI_INT, receive.data(), 1, MPI_INT, comm);
   for (int r = 1; r < shares.ranks; ++r) receive_at[r] = receive_at[r - 1] + receive[r - 1];
   std::vector<double> incoming(receive_at.back() + receive.back());
-  MPI_Alltoallv(outgoing.data(), send.data(), send_at.data(), MPI_DOUBLE, incoming.data(), receive.data(), receive_at.data(),
-                MPI_DOUBLE, comm);
+  MPI_Alltoallv(outgoing.data(), send.data(), send_at.data(), MPI_DOUBLE, incoming.data(), receive.data(),
+                receive_at.data(), MPI_DOUBLE, comm);
   return incoming;
 }
 
@@ -93,8 +93,10 @@ BodyState state_of(int body, const std::array<double, Moments::size>& m, const V
   second << m[10], m[13], m[15], m[13], m[11], m[14], m[15], m[14], m[12];
   second -= m[0] * offset * offset.transpose();
   const Mat3 inertia = second.trace() * Mat3::Identity() - second;
-  if (dimension == 2) s.angular_velocity[2] = inertia(2, 2) > 0 ? spin[2] / inertia(2, 2) : 0.0;
-  else s.angular_velocity = inertia.ldlt().solve(spin);
+  if (dimension == 2)
+    s.angular_velocity[2] = inertia(2, 2) > 0 ? spin[2] / inertia(2, 2) : 0.0;
+  else
+    s.angular_velocity = inertia.ldlt().solve(spin);
   for (int i = 0; i < 6; ++i) s.mean_stress[i] = m[16 + i] / m[22];
   return s;
 }
@@ -134,7 +136,8 @@ std::vector<BodyState> body_states(const Simulation<Dim>& simulation) {
       for (const auto& [a, b] : {pair, std::pair(pair.second, pair.first)}) pairs.push_back(a), pairs.push_back(b);
   const auto seen = send_home(pairs, 2, shares, simulation.communicator());
   std::map<int, std::map<int, bool>> partners;
-  for (std::size_t i = 0; i < seen.size(); i += 2) partners[static_cast<int>(seen[i])][static_cast<int>(seen[i + 1])] = true;
+  for (std::size_t i = 0; i < seen.size(); i += 2)
+    partners[static_cast<int>(seen[i])][static_cast<int>(seen[i + 1])] = true;
   for (auto& state : states) state.contacts = static_cast<int>(partners[state.body].size());
   return states;
 }
@@ -151,7 +154,8 @@ std::vector<ContactState> contact_states(const Simulation<Dim>& simulation, doub
   const auto incoming = send_home(records, width, shares_of(simulation), simulation.communicator());
   std::map<std::array<int, 3>, const double*> ordered;
   for (std::size_t i = 0; i < incoming.size(); i += width)
-    ordered[{static_cast<int>(incoming[i]), static_cast<int>(incoming[i + 1]), static_cast<int>(incoming[i + 2])}] = &incoming[i + 3];
+    ordered[{static_cast<int>(incoming[i]), static_cast<int>(incoming[i + 1]), static_cast<int>(incoming[i + 2])}] =
+        &incoming[i + 3];
   std::map<std::pair<int, int>, ContactSum<Dim>> sums;
   for (const auto& [key, values] : ordered) {
     auto& sum = sums[{key[0], key[1]}].values;

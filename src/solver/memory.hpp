@@ -1,12 +1,11 @@
 #pragma once
 /// Memory: what a run will need, and what there is.
 
-#include <mpi.h>
-
 #include <cstdint>
 #include <vector>
 
 #include "cairn/core/options.hpp"
+#include "cairn/parallel/communicator.hpp"
 
 namespace cairn {
 

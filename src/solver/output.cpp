@@ -1,9 +1,9 @@
 #include "cairn/solver/output.hpp"
 
+#include <deque>
+
 #include "cairn/io/table_file.hpp"
 #include "cairn/solver/body_states.hpp"
-
-#include <deque>
 
 namespace cairn {
 namespace {
@@ -11,18 +11,20 @@ namespace {
 /// Columns under construction; keeps their numbers alive until the file is written.
 class Columns {
  public:
-  std::vector<double>& add_doubles(const std::string& name, int components) {
-    return add(name, components, doubles_);
-  }
+  std::vector<double>& add_doubles(const std::string& name, int components) { return add(name, components, doubles_); }
   std::vector<std::int32_t>& add_ints(const std::string& name, int components) { return add(name, components, ints_); }
-  std::vector<std::int64_t>& add_longs(const std::string& name, int components) { return add(name, components, longs_); }
+  std::vector<std::int64_t>& add_longs(const std::string& name, int components) {
+    return add(name, components, longs_);
+  }
 
   std::vector<Column> view() const {
     std::vector<Column> columns;
     for (const auto& [name, components, values] : columns_)
-      std::visit([&, &name = name, &components = components](const auto* list) {
-        columns.push_back({name, components, std::span(*list)});
-      }, values);
+      std::visit(
+          [&, &name = name, &components = components](const auto* list) {
+            columns.push_back({name, components, std::span(*list)});
+          },
+          values);
     return columns;
   }
 
@@ -33,7 +35,8 @@ class Columns {
     columns_.emplace_back(name, components, &store.back());
     return store.back();
   }
-  using Values = std::variant<const std::vector<double>*, const std::vector<std::int32_t>*, const std::vector<std::int64_t>*>;
+  using Values =
+      std::variant<const std::vector<double>*, const std::vector<std::int32_t>*, const std::vector<std::int64_t>*>;
   std::deque<std::vector<double>> doubles_;
   std::deque<std::vector<std::int32_t>> ints_;
   std::deque<std::vector<std::int64_t>> longs_;
@@ -45,7 +48,8 @@ template <int Dim>
 RowBlocks point_rows(const Simulation<Dim>& simulation) {
   std::vector<std::int64_t> counts(simulation.lattice().patch_count(), 0);
   for (const auto& patch : simulation.patches()) counts[patch.id] = patch.point_count();
-  MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM, simulation.communicator());
+  MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM,
+                simulation.communicator());
   RowBlocks rows;
   auto patch = simulation.patches().begin();
   for (int id = 0; id < simulation.lattice().patch_count(); rows.total_rows += counts[id], ++id)
@@ -76,26 +80,36 @@ class PointTable {
   explicit PointTable(const Simulation<Dim>& simulation) : simulation_(simulation) {}
 
   void add(const std::string& field) {
-    if (field == "position") add_columns(field, 3, [](auto& points, int p, int c) { return c < Dim ? points.column(c)[p] : 0.0; });
+    if (field == "position")
+      add_columns(field, 3, [](auto& points, int p, int c) { return c < Dim ? points.column(c)[p] : 0.0; });
     else if (field == "velocity")
-      add_columns(field, 3, [](auto& points, int p, int c) { return c < Dim ? points.column(C::velocity + c)[p] : 0.0; });
+      add_columns(field, 3,
+                  [](auto& points, int p, int c) { return c < Dim ? points.column(C::velocity + c)[p] : 0.0; });
     else if (field == "stress")
-      add_columns(field, 6, [](auto& points, int p, int c) { return c < symmetric_size<Dim> ? points.column(C::stress + c)[p] : 0.0; });
+      add_columns(field, 6, [](auto& points, int p, int c) {
+        return c < symmetric_size<Dim> ? points.column(C::stress + c)[p] : 0.0;
+      });
     else if (field == "deformation_gradient")
       add_columns(field, 9, [](auto& points, int p, int c) {
         if (Dim == 2 && c != 8 && (c % 3 == 2 || c / 3 == 2)) return 0.0;
         return points.column(C::deformation + tensor_index<Dim>(c / 3, c % 3))[p];
       });
-    else if (field == "volume") add_piecewise(field, [](auto& piece, double) { return volumes(piece.points); });
-    else if (field == "mass") add_piecewise(field, [](auto& piece, double density) {
-      std::vector<double> m(piece.points.column(C::volume), piece.points.column(C::volume) + piece.points.size());
-      for (double& value : m) value *= density;
-      return m;
-    });
-    else if (field == "body") add_body();
-    else if (field == "id") add_id();
-    else if (field == "image") add_image();
-    else add_state(field);
+    else if (field == "volume")
+      add_piecewise(field, [](auto& piece, double) { return volumes(piece.points); });
+    else if (field == "mass")
+      add_piecewise(field, [](auto& piece, double density) {
+        std::vector<double> m(piece.points.column(C::volume), piece.points.column(C::volume) + piece.points.size());
+        for (double& value : m) value *= density;
+        return m;
+      });
+    else if (field == "body")
+      add_body();
+    else if (field == "id")
+      add_id();
+    else if (field == "image")
+      add_image();
+    else
+      add_state(field);
   }
 
   std::vector<Column> view() const { return columns_.view(); }
@@ -146,7 +160,8 @@ class PointTable {
   void add_id() {
     auto& out = columns_.add_longs("id", 1);
     out.reserve(count());
-    for_pieces([&](const Piece<Dim>& piece) { out.insert(out.end(), piece.points.ids().begin(), piece.points.ids().end()); });
+    for_pieces(
+        [&](const Piece<Dim>& piece) { out.insert(out.end(), piece.points.ids().begin(), piece.points.ids().end()); });
   }
   void add_image() {
     auto& out = columns_.add_ints("image", 3);
@@ -175,12 +190,14 @@ void append(std::vector<double>& out, const Vec3& v) { out.insert(out.end(), v.d
 }  // namespace
 
 template <int Dim>
-void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file, const std::vector<std::string>& fields) {
+void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file,
+                     const std::vector<std::string>& fields) {
   PointTable<Dim> table(simulation);
   table.add("position");
   for (const auto& field : fields)
     if (field != "position") table.add(field);
-  write_vtkhdf(file, simulation.communicator(), point_rows(simulation), table.view(), simulation.time(), simulation.steps());
+  write_vtkhdf(file, simulation.communicator(), point_rows(simulation), table.view(), simulation.time(),
+               simulation.steps());
 }
 
 template <int Dim>
@@ -197,7 +214,8 @@ void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path
   auto& stress = columns.add_doubles("mean_stress", 6);
   auto& contacts = columns.add_ints("contact_count", 1);
   for (const BodyState& s : states) {
-    append(position, s.centre), append(centre, s.centre), append(velocity, s.velocity), append(spin, s.angular_velocity);
+    append(position, s.centre), append(centre, s.centre), append(velocity, s.velocity),
+        append(spin, s.angular_velocity);
     body.push_back(s.body), material.push_back(simulation.bodies()[s.body].material), contacts.push_back(s.contacts);
     mass.push_back(s.mass);
     stress.insert(stress.end(), s.mean_stress.begin(), s.mean_stress.end());
@@ -221,12 +239,14 @@ void write_contacts(const Simulation<Dim>& simulation, const std::filesystem::pa
     append(position, s.point), append(point, s.point), append(normal, s.normal), append(force, s.force);
   }
   const RowBlocks rows = consecutive_rows(static_cast<std::int64_t>(states.size()), simulation.communicator());
-  write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(), "contacts");
+  write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(),
+               "contacts");
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                           \
-  template void write_particles(const Simulation<Dim>&, const std::filesystem::path&, const std::vector<std::string>&); \
-  template void write_grains(const Simulation<Dim>&, const std::filesystem::path&);                                     \
+#define CAIRN_INSTANTIATE(Dim)                                                        \
+  template void write_particles(const Simulation<Dim>&, const std::filesystem::path&, \
+                                const std::vector<std::string>&);                     \
+  template void write_grains(const Simulation<Dim>&, const std::filesystem::path&);   \
   template void write_contacts(const Simulation<Dim>&, const std::filesystem::path&, double);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

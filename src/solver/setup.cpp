@@ -1,13 +1,13 @@
+#include <fmt/format.h>
+
+#include <numeric>
+#include <set>
+
 #include "cairn/core/error.hpp"
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/simulation.hpp"
 #include "memory.hpp"
-
-#include <fmt/format.h>
-
-#include <numeric>
-#include <set>
 
 namespace cairn {
 namespace {
@@ -33,7 +33,8 @@ SolverMaterial make_material(const Material& spec) {
         m.state_names.assign(law.state_names.begin(), law.state_names.end());
         Symmetric<3, double> stress{};
         double state[8] = {};
-        m.longitudinal_modulus = law.update(Tensor<3, double>{}, Tensor<3, double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, 1.0, stress, state);
+        m.longitudinal_modulus =
+            law.update(Tensor<3, double>{}, Tensor<3, double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, 1.0, stress, state);
       },
       m.law);
   return m;
@@ -42,7 +43,8 @@ SolverMaterial make_material(const Material& spec) {
 std::vector<Body> make_bodies(const Case& c, const std::vector<SolverMaterial>& materials) {
   std::vector<Body> bodies;
   for (const auto& spec : c.bodies)
-    bodies.push_back({spec.material, materials[spec.material].rigid, spec.velocity, spec.angular_velocity, centre(spec.shape)});
+    bodies.push_back(
+        {spec.material, materials[spec.material].rigid, spec.velocity, spec.angular_velocity, centre(spec.shape)});
   for (const auto& drive : c.drives) {
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       if (!selects(drive, c.bodies[b], static_cast<int>(b), c.domain)) continue;
@@ -75,8 +77,12 @@ FaceConditions<Dim> make_faces(const Case& c) {
 template <int Dim>
 class Filler {
  public:
-  Filler(const Case& c, const Lattice<Dim>& lattice, const std::vector<Body>& bodies, const std::vector<SolverMaterial>& materials)
-      : case_(c), lattice_(lattice), bodies_(bodies), materials_(materials),
+  Filler(const Case& c, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
+         const std::vector<SolverMaterial>& materials)
+      : case_(c),
+        lattice_(lattice),
+        bodies_(bodies),
+        materials_(materials),
         per_direction_(static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / Dim)))),
         bodies_of_(lattice.patch_count()) {
     for (int b = 0; b < static_cast<int>(c.bodies.size()); ++b) list_images(b);
@@ -130,20 +136,22 @@ class Filler {
  private:
   struct Placed {
     int body;
-    Vec3 shift;       // of the image that reaches here
-    Box<Dim> cells;   // that its bounds touch
+    Vec3 shift;      // of the image that reaches here
+    Box<Dim> cells;  // that its bounds touch
   };
 
   /// Lists the patches that a body and its periodic images touch.
   void list_images(int b) {
     const Bounds all = bounds(case_.bodies[b].shape);
     Box<Dim> images;
-    for (int d = 0; d < Dim; ++d) images.lower[d] = lattice_.periodic(d) ? -1 : 0, images.upper[d] = lattice_.periodic(d) ? 2 : 1;
+    for (int d = 0; d < Dim; ++d)
+      images.lower[d] = lattice_.periodic(d) ? -1 : 0, images.upper[d] = lattice_.periodic(d) ? 2 : 1;
     for_each(images, [&](const Index<Dim>& image) {
       Placed placed{b, Vec3::Zero(), {}};
       for (int d = 0; d < Dim; ++d) {
         placed.shift[d] = image[d] * lattice_.length(d);
-        const double low = lattice_.scaled(d, all.lower[d] + placed.shift[d]), high = lattice_.scaled(d, all.upper[d] + placed.shift[d]);
+        const double low = lattice_.scaled(d, all.lower[d] + placed.shift[d]),
+                     high = lattice_.scaled(d, all.upper[d] + placed.shift[d]);
         placed.cells.lower[d] = static_cast<int>(std::floor(std::clamp(low, 0.0, double(lattice_.cells()[d]))));
         placed.cells.upper[d] = static_cast<int>(std::ceil(std::clamp(high, 0.0, double(lattice_.cells()[d]))));
       }
@@ -153,7 +161,8 @@ class Filler {
       const auto from = lattice_.patch_position(lattice_.patch_of_cell(placed.cells.lower));
       auto to = lattice_.patch_position(lattice_.patch_of_cell(last));
       for (auto& i : to) ++i;
-      for_each(Box<Dim>{from, to}, [&](const Index<Dim>& position) { bodies_of_[lattice_.patch_at(position)].push_back(placed); });
+      for_each(Box<Dim>{from, to},
+               [&](const Index<Dim>& position) { bodies_of_[lattice_.patch_at(position)].push_back(placed); });
     });
   }
 
@@ -167,13 +176,15 @@ class Filler {
 
 /// \throws InputError on every rank where a body got no point at all
 void check_bodies(const Case& c, std::vector<std::int64_t>& points_of_body, MPI_Comm comm) {
-  MPI_Allreduce(MPI_IN_PLACE, points_of_body.data(), static_cast<int>(points_of_body.size()), MPI_INT64_T, MPI_SUM, comm);
+  MPI_Allreduce(MPI_IN_PLACE, points_of_body.data(), static_cast<int>(points_of_body.size()), MPI_INT64_T, MPI_SUM,
+                comm);
   std::vector<std::string> errors;
   for (std::size_t b = 0; b < points_of_body.size(); ++b)
     if (points_of_body[b] == 0 && errors.size() < 20)
-      errors.push_back(fmt::format("{}: body {} holds no material point: it is smaller than the spacing of the points or lies "
-                                   "outside the domain; use smaller cells or more points per cell",
-                                   c.bodies[b].source, b));
+      errors.push_back(
+          fmt::format("{}: body {} holds no material point: it is smaller than the spacing of the points or lies "
+                      "outside the domain; use smaller cells or more points per cell",
+                      c.bodies[b].source, b));
   if (!errors.empty()) throw InputError(errors);
 }
 
@@ -181,8 +192,13 @@ void check_bodies(const Case& c, std::vector<std::int64_t>& points_of_body, MPI_
 
 template <int Dim>
 Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from)
-    : comm_(comm), solver_(c.solver), parallel_(c.parallel), limits_(c.time), lattice_(make_lattice<Dim>(c.domain)),
-      transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))), faces_(make_faces<Dim>(c)) {
+    : comm_(comm),
+      solver_(c.solver),
+      parallel_(c.parallel),
+      limits_(c.time),
+      lattice_(make_lattice<Dim>(c.domain)),
+      transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))),
+      faces_(make_faces<Dim>(c)) {
   MPI_Comm_rank(comm_, &rank_);
   MPI_Comm_size(comm_, &ranks_);
   std::vector<ContactMaterial> contact_materials;
@@ -197,8 +213,10 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   bodies_ = make_bodies(c, materials_);
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
-  if (from) restore(*from);
-  else place_points(c);
+  if (from)
+    restore(*from);
+  else
+    place_points(c);
 }
 
 template <int Dim>

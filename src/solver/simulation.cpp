@@ -1,12 +1,12 @@
 #include "cairn/solver/simulation.hpp"
 
-#include "cairn/core/error.hpp"
-#include "cairn/io/agreement.hpp"
-#include "cairn/parallel/balance.hpp"
-
 #include <fmt/format.h>
 
 #include <set>
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/agreement.hpp"
+#include "cairn/parallel/balance.hpp"
 
 namespace cairn {
 namespace {
@@ -94,8 +94,10 @@ void Simulation<Dim>::strain_first(double share) {
       constrain_velocity(patch, lattice_, faces_, bodies_, false);
       for (auto& piece : patch.pieces) {
         const auto& material = material_of(piece);
-        if (is_rigid(piece)) std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
-        else update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
+        if (is_rigid(piece))
+          std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
+        else
+          update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
       }
     });
   }
@@ -155,7 +157,8 @@ void Simulation<Dim>::strain_last(double share) {
   for_pieces([&](Piece<Dim>& piece) {
     if (solver_.stress_update == StressUpdate::last) velocity_from_motion(piece);
     const auto& material = material_of(piece);
-    if (!is_rigid(piece)) update_stress(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
+    if (!is_rigid(piece))
+      update_stress(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
   });
 }
 
@@ -163,8 +166,10 @@ template <int Dim>
 void Simulation<Dim>::move_points() {
   const auto time = timers_.measure(Stage::update);
   for_pieces([&](Piece<Dim>& piece) {
-    if (is_rigid(piece)) move_rigid(piece);
-    else move(piece, lattice_, transfer_, dt_, speeds_);
+    if (is_rigid(piece))
+      move_rigid(piece);
+    else
+      move(piece, lattice_, transfer_, dt_, speeds_);
   });
 }
 

@@ -1,12 +1,13 @@
-#include "cairn/solver/simulation.hpp"
-
 #include <map>
+
+#include "cairn/solver/simulation.hpp"
 
 namespace cairn {
 namespace {
 
 constexpr int sum_count = 11;
-using Sums = std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass, nodes
+using Sums =
+    std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass, nodes
 
 /// One point's deformation gradient.
 template <int Dim>

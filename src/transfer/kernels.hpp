@@ -2,10 +2,10 @@
 /// The pieces that every transfer is made of: loops over points, eight at a time, and what is gathered or scattered.
 /// Nodes are visited point by point, and a node's quantities lie side by side: one vector operation serves them all.
 
+#include <algorithm>
+
 #include "cairn/grid/shape_functions.hpp"
 #include "cairn/transfer/transfer.hpp"
-
-#include <algorithm>
 
 namespace cairn::kernels {
 
@@ -13,9 +13,12 @@ namespace cairn::kernels {
 template <int Dim, class F>
 void with_shape(const TransferSettings<Dim>& settings, F&& f) {
   switch (settings.shape) {
-    case ShapeFunction::linear: return f(LinearShape{});
-    case ShapeFunction::gimp: return f(GimpShape{settings.half_size});
-    case ShapeFunction::bspline2: return f(QuadraticShape{});
+    case ShapeFunction::linear:
+      return f(LinearShape{});
+    case ShapeFunction::gimp:
+      return f(GimpShape{settings.half_size});
+    case ShapeFunction::bspline2:
+      return f(QuadraticShape{});
   }
 }
 
@@ -28,7 +31,8 @@ void with_normal_shape(const TransferSettings<Dim>& settings, F&& f) {
 
 /// Calls f(first, count, stencil) for every eight points (fewer at the end).
 template <int Dim, class Shape, class F>
-void for_chunks(const Points<Dim>& points, const Lattice<Dim>& lattice, const Box<Dim>& box, const Shape& shape, F&& f) {
+void for_chunks(const Points<Dim>& points, const Lattice<Dim>& lattice, const Box<Dim>& box, const Shape& shape,
+                F&& f) {
   for (int first = 0; first < points.size(); first += lane_count) {
     const double* x[Dim];
     for (int d = 0; d < Dim; ++d) x[d] = points.column(d) + first;

@@ -1,6 +1,5 @@
 #include "kernels.hpp"
 
-
 namespace cairn {
 namespace {
 
@@ -32,7 +31,8 @@ void scatter_sums(const Points<Dim>& points, int first, int count, const Stencil
 
 /// Gradients with weights of their own.
 template <int Dim>
-void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density) {
+void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                     double density) {
   using C = PointColumns<Dim>;
   using N = NodeSums<Dim>;
   double* sums = piece.nodes.sums.data();
@@ -95,7 +95,8 @@ Box<Dim> touched_nodes(const Points<Dim>& points, const Lattice<Dim>& lattice, c
     const auto [low, high] = std::minmax_element(x, x + points.size());
     const double first = lattice.scaled(d, *low), last = lattice.scaled(d, *high);
     const auto widen = [&]<class Shape>(const Shape&) {
-      const int lower = static_cast<int>(Shape::first_node(first)), upper = static_cast<int>(Shape::first_node(last)) + Shape::nodes;
+      const int lower = static_cast<int>(Shape::first_node(first)),
+                upper = static_cast<int>(Shape::first_node(last)) + Shape::nodes;
       const bool unset = box.upper[d] <= box.lower[d];
       box.lower[d] = unset ? lower : std::min(box.lower[d], lower);
       box.upper[d] = unset ? upper : std::max(box.upper[d], upper);
@@ -151,9 +152,9 @@ void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSetti
   if (settings.extras) project_extras(piece, lattice, settings);
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                         \
-  template struct TransferSettings<Dim>;                                                                               \
-  template void lay_out_nodes(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&);                         \
+#define CAIRN_INSTANTIATE(Dim)                                                                 \
+  template struct TransferSettings<Dim>;                                                       \
+  template void lay_out_nodes(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&); \
   template void project(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -11,18 +11,21 @@ auto gather_motion(const Stencil<Dim, Shape>& stencil, int lane, const double* m
   using M = NodeMotion<Dim>;
   if constexpr (Dim == 2) {
     Lanes4 sum{};
-    stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) { sum += load4(motion + node * M::width) * w; });
+    stencil.for_nodes(lane,
+                      [&](int node, double w, const double(&)[Dim]) { sum += load4(motion + node * M::width) * w; });
     return sum;
   } else {
     Lanes sum{};
-    stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) { sum += load(motion + node * M::width) * w; });
+    stencil.for_nodes(lane,
+                      [&](int node, double w, const double(&)[Dim]) { sum += load(motion + node * M::width) * w; });
     return sum;
   }
 }
 
 /// v_p += dt sum N a, blended with sum N v.
 template <int Dim, class Shape>
-void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double dt, double flip) {
+void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double dt,
+                     double flip) {
   using M = NodeMotion<Dim>;
   for (int lane = 0; lane < count; ++lane) {
     const auto sum = gather_motion(stencil, lane, piece.nodes.motion.data());
@@ -35,8 +38,8 @@ void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim,
 }
 
 template <int Dim, class Shape>
-void scatter_momentum(const Points<Dim>& points, int first, int count, const Stencil<Dim, Shape>& stencil, double density,
-                      double* momentum) {
+void scatter_momentum(const Points<Dim>& points, int first, int count, const Stencil<Dim, Shape>& stencil,
+                      double density, double* momentum) {
   using C = PointColumns<Dim>;
   for (int lane = 0; lane < count; ++lane) {
     Lanes4 p{};
@@ -58,8 +61,8 @@ void for_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
 }  // namespace
 
 template <int Dim>
-void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, const Law& law,
-                   double density, double dt, SpeedLimits& speeds) {
+void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                   const Law& law, double density, double dt, SpeedLimits& speeds) {
   double fastest = speeds.wave * speeds.wave;
   std::visit(
       [&](const auto& concrete) {
@@ -98,7 +101,8 @@ void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSe
 }
 
 template <int Dim>
-void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density) {
+void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                      double density) {
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
   for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
     scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
@@ -116,7 +120,8 @@ void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
 }
 
 template <int Dim>
-void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt, SpeedLimits& speeds) {
+void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt,
+          SpeedLimits& speeds) {
   using C = PointColumns<Dim>;
   using M = NodeMotion<Dim>;
   Points<Dim>& points = piece.points;
@@ -188,18 +193,19 @@ void velocity_from_motion(Piece<Dim>& piece) {
     std::copy_n(nodes.motion.data() + node * M::width + M::velocity, Dim, nodes.velocity.data() + node * vector_width);
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                          \
-  template void update_stress(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, double, double, \
-                              SpeedLimits&);                                                                            \
-  template void update_stress_and_force(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,     \
-                                        double, double, SpeedLimits&);                                                  \
-  template void accelerate(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);                     \
-  template void project_momentum(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);               \
-  template void accelerate_and_project(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, double); \
-  template void move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, SpeedLimits&);             \
-  template void integrate(Piece<Dim>&, double);                                                                         \
-  template void velocity_from_sums(Piece<Dim>&);                                                                        \
-  template void velocity_from_momentum(Piece<Dim>&);                                                                    \
+#define CAIRN_INSTANTIATE(Dim)                                                                                      \
+  template void update_stress(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, double,   \
+                              double, SpeedLimits&);                                                                \
+  template void update_stress_and_force(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, \
+                                        double, double, SpeedLimits&);                                              \
+  template void accelerate(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);                 \
+  template void project_momentum(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);           \
+  template void accelerate_and_project(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double,      \
+                                       double);                                                                     \
+  template void move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, SpeedLimits&);         \
+  template void integrate(Piece<Dim>&, double);                                                                     \
+  template void velocity_from_sums(Piece<Dim>&);                                                                    \
+  template void velocity_from_momentum(Piece<Dim>&);                                                                \
   template void velocity_from_motion(Piece<Dim>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -12,12 +12,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::set<std::string> results = {"bodies.csv",           "checkpoint_000020.h5",    "contacts_000001.h5",
-                                       "grains_1234567.h5",    "history.csv",             "particles.hdf.series",
-                                       "particles_000.vtkhdf", "particles_000012.vtkhdf"};
-const std::set<std::string> others = {"case.toml",         "notes.txt",          "history.csv.bak", "my_history.csv",
-                                      "particles_.vtkhdf", "particles_a.vtkhdf", "grains_01.csv",   "checkpoint_1.h5.old",
-                                      "summary.json",      "shear_000001.h5"};
+const std::set<std::string> results = {
+    "bodies.csv",  "checkpoint_000020.h5", "contacts_000001.h5",   "grains_1234567.h5",
+    "history.csv", "particles.hdf.series", "particles_000.vtkhdf", "particles_000012.vtkhdf"};
+const std::set<std::string> others = {
+    "case.toml",          "notes.txt",     "history.csv.bak",     "my_history.csv", "particles_.vtkhdf",
+    "particles_a.vtkhdf", "grains_01.csv", "checkpoint_1.h5.old", "summary.json",   "shear_000001.h5"};
 
 TEST(ResultFiles, NamesAreRecognised) {
   for (const auto& name : results) EXPECT_TRUE(is_result_name(name)) << name;

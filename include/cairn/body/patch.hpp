@@ -1,12 +1,12 @@
 #pragma once
 /// Patch: a box of cells and the pieces of bodies in it. All arithmetic of a patch depends on the patch alone.
 
-#include "cairn/body/piece.hpp"
-#include "cairn/grid/lattice.hpp"
-
 #include <algorithm>
 #include <map>
 #include <utility>
+
+#include "cairn/body/piece.hpp"
+#include "cairn/grid/lattice.hpp"
 
 namespace cairn {
 
@@ -35,10 +35,11 @@ struct Patch {
   int links_before = 0;            // links whose contributions come before the patch's own
   std::vector<Piece<Dim>> pieces;  // ascending in body; those without points are ghosts
   PatchLedger ledger;
-  double seconds = 0;              // processor time spent on it since the last balance; steers nothing but balance
+  double seconds = 0;  // processor time spent on it since the last balance; steers nothing but balance
   std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
 
-  Patch(int id_, const Lattice<Dim>& lattice) : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
+  Patch(int id_, const Lattice<Dim>& lattice)
+      : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
     links = lattice.links(id);
     for (const auto& link : links) {
       overlaps.push_back(intersection(nodes, lattice.patch_nodes(link.patch).shifted(link.shift)));
@@ -54,7 +55,8 @@ struct Patch {
 
   /// The piece of a body, made (with `states` state columns) where there is none.
   Piece<Dim>& piece_of(int body, int states) {
-    auto at = std::lower_bound(pieces.begin(), pieces.end(), body, [](const Piece<Dim>& p, int b) { return p.body < b; });
+    auto at =
+        std::lower_bound(pieces.begin(), pieces.end(), body, [](const Piece<Dim>& p, int b) { return p.body < b; });
     if (at == pieces.end() || at->body != body) at = pieces.emplace(at, body, states);
     return *at;
   }

@@ -9,7 +9,7 @@ namespace cairn {
 /// What a body is, the same on every rank: a few bytes for each body.
 struct Body {
   std::int32_t material = 0;
-  bool rigid = false;              // moves as prescribed, infinitely heavy in contact
+  bool rigid = false;                    // moves as prescribed, infinitely heavy in contact
   Vec3 velocity = Vec3::Zero();          // of a rigid body [m/s]
   Vec3 angular_velocity = Vec3::Zero();  // of a rigid body [rad/s] about its centre
   Vec3 centre = Vec3::Zero();            // at the start [m]
@@ -22,7 +22,8 @@ struct NodeSums {
   static constexpr int mass = 0, momentum = 1, volume = 1 + Dim, gradient = 2 + Dim;
   static constexpr int used = 2 + 2 * Dim, width = 8;
 };
-/// Sums that only some releases need: volume-weighted stress (xx yy xy | xx yy zz xy yz xz) and position relative to the node.
+/// Sums that only some releases need: volume-weighted stress (xx yy xy | xx yy zz xy yz xz) and position relative to
+/// the node.
 template <int Dim>
 struct NodeExtras {
   static constexpr int stress = 0, position = Dim == 2 ? 3 : 6;
@@ -39,16 +40,17 @@ inline constexpr int vector_width = 4;  // a vector at a node, padded
 /// Nodal quantities of one velocity field over a box of nodes.
 template <int Dim>
 struct NodeBox {
-  Box<Dim> box;            // all nodes with data: own and received
-  Box<Dim> own;            // nodes that the piece's own points touch
-  AlignedDoubles sums;     // NodeSums
-  AlignedDoubles force;    // internal + external force [N], vector_width
-  AlignedDoubles velocity; // velocity for strains [m/s] (or momentum, while it is projected again), vector_width
-  AlignedDoubles motion;   // NodeMotion
-  AlignedDoubles extras;   // NodeExtras, empty where not needed
+  Box<Dim> box;             // all nodes with data: own and received
+  Box<Dim> own;             // nodes that the piece's own points touch
+  AlignedDoubles sums;      // NodeSums
+  AlignedDoubles force;     // internal + external force [N], vector_width
+  AlignedDoubles velocity;  // velocity for strains [m/s] (or momentum, while it is projected again), vector_width
+  AlignedDoubles motion;    // NodeMotion
+  AlignedDoubles extras;    // NodeExtras, empty where not needed
 
   std::size_t memory() const {
-    return (sums.capacity() + force.capacity() + velocity.capacity() + motion.capacity() + extras.capacity()) * sizeof(double);
+    return (sums.capacity() + force.capacity() + velocity.capacity() + motion.capacity() + extras.capacity()) *
+           sizeof(double);
   }
 };
 

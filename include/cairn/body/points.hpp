@@ -1,23 +1,24 @@
 #pragma once
-/// Material points of one piece of a body: structure of arrays, one aligned block, columns padded to whole vectors of lanes.
+/// Material points of one piece of a body: structure of arrays, one aligned block, columns padded to whole vectors of
+/// lanes.
+
+#include <span>
 
 #include "cairn/core/aligned.hpp"
 #include "cairn/core/tensor.hpp"
 #include "cairn/core/types.hpp"
-
-#include <span>
 
 namespace cairn {
 
 /// First column of each quantity.
 template <int Dim>
 struct PointColumns {
-  static constexpr int position = 0;                                        // [m]
-  static constexpr int velocity = Dim;                                      // [m/s]
-  static constexpr int deformation = 2 * Dim;                               // deformation gradient F (tensor_size columns)
-  static constexpr int stress = deformation + tensor_size<Dim>;             // Cauchy stress [Pa] (symmetric_size columns)
-  static constexpr int volume = stress + symmetric_size<Dim>;               // reference volume [m^Dim]
-  static constexpr int state = volume + 1;                                  // the law's own variables
+  static constexpr int position = 0;                             // [m]
+  static constexpr int velocity = Dim;                           // [m/s]
+  static constexpr int deformation = 2 * Dim;                    // deformation gradient F (tensor_size columns)
+  static constexpr int stress = deformation + tensor_size<Dim>;  // Cauchy stress [Pa] (symmetric_size columns)
+  static constexpr int volume = stress + symmetric_size<Dim>;    // reference volume [m^Dim]
+  static constexpr int state = volume + 1;                       // the law's own variables
 };
 
 /// Crossings of periodic boundaries since the start, for each direction: position + image * period is continuous.
@@ -32,7 +33,8 @@ class Points {
 
   int size() const { return size_; }
   int columns() const { return columns_; }
-  /// Values of one column: size() of them, followed by padding up to a whole vector of lanes that may be read and written.
+  /// Values of one column: size() of them, followed by padding up to a whole vector of lanes that may be read and
+  /// written.
   double* column(int c) { return data_.data() + static_cast<std::size_t>(c) * capacity_; }
   const double* column(int c) const { return data_.data() + static_cast<std::size_t>(c) * capacity_; }
   std::vector<std::int64_t>& ids() { return ids_; }  // unique, kept for life
@@ -51,7 +53,9 @@ class Points {
   /// Keeps the points listed, in that order (ascending or not).
   void select(std::span<const int> order);
   /// Bytes held.
-  std::size_t memory() const { return data_.capacity() * sizeof(double) + ids_.capacity() * 8 + images_.capacity() * 8; }
+  std::size_t memory() const {
+    return data_.capacity() * sizeof(double) + ids_.capacity() * 8 + images_.capacity() * 8;
+  }
 
  private:
   void reallocate(int capacity);

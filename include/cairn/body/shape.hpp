@@ -2,11 +2,11 @@
 /// Geometry of bodies: which points of space a body fills at the start. One set of shapes serves 2D and 3D:
 /// in 2D every z is zero and a `Ball` is a disk.
 
-#include "cairn/core/types.hpp"
-
 #include <string>
 #include <variant>
 #include <vector>
+
+#include "cairn/core/types.hpp"
 
 namespace cairn {
 

@@ -1,7 +1,8 @@
 #pragma once
-/// Faces of the domain: fixed faces and symmetry planes as conditions on nodal velocities, walls as contact with a rigid
-/// half-space. Nodes beyond a face follow it: a fixed face's velocity holds there too, a wall acts as on the wall, and
-/// beyond a symmetry plane lies the mirror image. To add a kind of face: FaceType, its name in the case reader, and here.
+/// Faces of the domain: fixed faces and symmetry planes as conditions on nodal velocities, walls as contact with a
+/// rigid half-space. Nodes beyond a face follow it: a fixed face's velocity holds there too, a wall acts as on the
+/// wall, and beyond a symmetry plane lies the mirror image. To add a kind of face: FaceType, its name in the case
+/// reader, and here.
 
 #include "cairn/contact/sweep.hpp"
 
@@ -27,13 +28,13 @@ template <int Dim>
 void mirror_vectors(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                     AlignedDoubles NodeBox<Dim>::*vectors);
 
-/// Fixed faces: their velocity at the nodes, for strains. With `close_ledger`, on velocities projected again at the end of
-/// the step, the loss of bringing the points to that velocity goes into the ledger (contact/ledger.hpp).
+/// Fixed faces: their velocity at the nodes, for strains. With `close_ledger`, on velocities projected again at the end
+/// of the step, the loss of bringing the points to that velocity goes into the ledger (contact/ledger.hpp).
 template <int Dim>
 void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                         const std::vector<Body>& bodies, bool close_ledger);
-/// Fixed faces, after the momentum update: velocity, and the acceleration that leads to it (Nairn 2013, section 2.4); the
-/// work goes into the ledger, and with `close_ledger` (nothing is projected again) the loss as well.
+/// Fixed faces, after the momentum update: velocity, and the acceleration that leads to it (Nairn 2013, section 2.4);
+/// the work goes into the ledger, and with `close_ledger` (nothing is projected again) the loss as well.
 template <int Dim>
 void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                       const std::vector<Body>& bodies, double dt, bool close_ledger);
@@ -46,8 +47,10 @@ class WallContact {
   void find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
             const ContactSettings<Dim>& settings, const ContactSweep<Dim>& sweep, const std::vector<Body>& bodies);
   void first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt);
-  void second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt, bool last);
-  void repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt);
+  void second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt,
+                   bool last);
+  void repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings,
+                   double dt);
 
  private:
   struct Entry {

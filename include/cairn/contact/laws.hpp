@@ -1,14 +1,15 @@
 #pragma once
-/// Laws of contact at a node, as pure functions. A body meets a partner: the rest of the node's bodies, a rigid body or a
-/// wall. Everything is said by the body's excess momentum and force over the partner's motion (NUMERICS, "Contact at a
-/// node"; Nairn 2013, eqs. 5 and 9 with the opposite sign):
-///   P = p_a - (m_a/M) sum p,  F = f_a - (m_a/M) sum f        P = p_a - m_a v,  F = f_a  against a rigid partner of velocity v
+/// Laws of contact at a node, as pure functions. A body meets a partner: the rest of the node's bodies, a rigid body or
+/// a wall. Everything is said by the body's excess momentum and force over the partner's motion (NUMERICS, "Contact at
+/// a node"; Nairn 2013, eqs. 5 and 9 with the opposite sign):
+///   P = p_a - (m_a/M) sum p,  F = f_a - (m_a/M) sum f        P = p_a - m_a v,  F = f_a  against a rigid partner of
+///   velocity v
 /// with n the unit normal out of the body. P . n > 0 means approach. Each function returns the impulse on the body.
+
+#include <cmath>
 
 #include "cairn/core/options.hpp"
 #include "cairn/core/types.hpp"
-
-#include <cmath>
 
 namespace cairn::contact {
 
@@ -35,8 +36,8 @@ Vec<Dim> limited_impulse(const Vec<Dim>& P, const Vec<Dim>& n, double normal, do
   return impulse;
 }
 
-/// Predicted reaction (the default release): the pair is held where the forces would press it together by the end of the
-/// step, and sticks where friction can carry the tangential force.
+/// Predicted reaction (the default release): the pair is held where the forces would press it together by the end of
+/// the step, and sticks where friction can carry the tangential force.
 template <int Dim>
 Decision decide_by_reaction(const Vec<Dim>& P, const Vec<Dim>& F, const Vec<Dim>& n, double mu, double dt) {
   Decision d;
@@ -69,8 +70,8 @@ Vec<Dim> approach_impulse(const Vec<Dim>& P, const Vec<Dim>& n, double mu) {
   return limited_impulse<Dim>(P, n, normal, friction_limit(mu, normal));
 }
 
-/// Release by traction: Bardenhagen et al. 2001, section 2.1 and eq. 10. `compressive`: the normal traction is; where the
-/// bodies are free of stress, approach decides.
+/// Release by traction: Bardenhagen et al. 2001, section 2.1 and eq. 10. `compressive`: the normal traction is; where
+/// the bodies are free of stress, approach decides.
 template <int Dim>
 Vec<Dim> traction_impulse(const Vec<Dim>& P, const Vec<Dim>& n, double mu, bool compressive, bool stress_free,
                           DepartingFriction departing) {
@@ -85,7 +86,8 @@ Vec<Dim> traction_impulse(const Vec<Dim>& P, const Vec<Dim>& n, double mu, bool 
 /// Factor on an impulse that keeps it from collapsing a cell: Bardenhagen et al. 2001, eqs. 17-22, with min for the
 /// printed max of eq. 22. `mass` the body's, `rest` the partner's (infinite for a rigid one).
 template <int Dim>
-double impulse_scale(const Vec<Dim>& impulse, double mass, double rest, const Vec<Dim>& spacing, double gamma, double dt) {
+double impulse_scale(const Vec<Dim>& impulse, double mass, double rest, const Vec<Dim>& spacing, double gamma,
+                     double dt) {
   if (gamma <= 0) return 1;
   const double rate = (impulse.cwiseQuotient(spacing)).cwiseAbs().maxCoeff() / mass * std::max(mass / rest, 1.0);
   return rate * dt > gamma ? gamma / (rate * dt) : 1.0;

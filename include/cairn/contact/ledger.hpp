@@ -1,9 +1,9 @@
 #pragma once
 /// The energy that contact gives to the points of a body at one node.
 ///
-/// With FLIP the points gain f dt . (v + v')/2 from a force f at a node, exactly, where v = p/m is the momentum projected
-/// at the start of the step and v' that projected again at its end; the strain energy takes f dt . (u + u')/2 with
-/// the velocities u, u' that strains see, which differ from v, v' by what contact changed on the nodes alone. So
+/// With FLIP the points gain f dt . (v + v')/2 from a force f at a node, exactly, where v = p/m is the momentum
+/// projected at the start of the step and v' that projected again at its end; the strain energy takes f dt . (u + u')/2
+/// with the velocities u, u' that strains see, which differ from v, v' by what contact changed on the nodes alone. So
 /// contact gives  I . (v + v')/2 - f dt . (J + J')/(2 m)  with I its impulse on the points and J, J' its impulses
 /// on the nodes before the strains. Where momentum is not projected again, v' = v and J' = J, to first order in dt.
 

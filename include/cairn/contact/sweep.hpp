@@ -1,10 +1,11 @@
 #pragma once
 /// Contact of the bodies in one patch: one sweep finds the nodes that bodies share, then each pass visits those alone.
-/// No neighbour search, no iteration, work linear in the nodes touched (Bardenhagen, Brackbill & Sulsky 2000, section 3).
+/// No neighbour search, no iteration, work linear in the nodes touched (Bardenhagen, Brackbill & Sulsky 2000, section
+/// 3).
 ///
-/// With common normals a node has one partner body, the rigid one or else the heaviest; every other body meets the rest of
-/// the node and the partner takes the opposite of their impulses, so that the impulses sum to zero for any number
-/// of bodies. With own normals each body meets the rest of the node along its own normal, as the papers print it.
+/// With common normals a node has one partner body, the rigid one or else the heaviest; every other body meets the rest
+/// of the node and the partner takes the opposite of their impulses, so that the impulses sum to zero for any number of
+/// bodies. With own normals each body meets the rest of the node along its own normal, as the papers print it.
 
 #include "cairn/body/patch.hpp"
 #include "cairn/contact/laws.hpp"
@@ -43,11 +44,11 @@ struct ContactEntry {
   int piece = 0, node = 0;  // position in the patch's pieces, offset in the piece's box
   double mass = 0;
   bool rigid = false;
-  bool open = false;        // contact is possible (not: too little there, too far apart, no normal)
+  bool open = false;  // contact is possible (not: too little there, too far apart, no normal)
   contact::Decision decision;
   bool compressive = false, stress_free = false;
   PairLaw law;
-  Vec<Dim> normal = Vec<Dim>::Zero();         // out of the body
+  Vec<Dim> normal = Vec<Dim>::Zero();  // out of the body
   contact::NodeRecord<Dim> record;
 };
 
@@ -60,9 +61,10 @@ class ContactSweep {
 
   /// Before the momentum update: changes the momenta in the sums; decides by reaction.
   void first_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
-  /// After p += dt f: changes the forces, so that points and nodes agree. With `last`, no repeat pass follows in this step,
-  /// and the ledger is closed here.
-  void second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt, bool last);
+  /// After p += dt f: changes the forces, so that points and nodes agree. With `last`, no repeat pass follows in this
+  /// step, and the ledger is closed here.
+  void second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt,
+                   bool last);
   /// On momenta projected again (NodeBox::velocity, before division by mass); closes the ledger.
   void repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
 
@@ -73,7 +75,7 @@ class ContactSweep {
   struct SharedNode {
     int first, count, partner;  // entries; position of the partner among them
     Index<Dim> place;
-    double share;               // in the ledger: 0 where another patch answers for it, half on a symmetry plane
+    double share;  // in the ledger: 0 where another patch answers for it, half on a symmetry plane
   };
   enum class Pass { first, second, repeat };
 
@@ -88,7 +90,8 @@ class ContactSweep {
   Vec<Dim> impulse(ContactEntry<Dim>& entry, const Vec<Dim>& P, const Vec<Dim>& F, const ContactSettings<Dim>& settings,
                    double dt, Pass pass) const;
   /// Impulses on all bodies of a node, from the momenta and forces in momenta_ and forces_; result in impulses_.
-  void resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt, Pass pass);
+  void resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt,
+               Pass pass);
   void load_node(const SharedNode& node, const Patch<Dim>& patch, Pass pass, double dt);
   void keep_pairs(const SharedNode& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
   void keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt, bool projected_again) const;

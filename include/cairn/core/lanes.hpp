@@ -1,6 +1,6 @@
 #pragma once
-/// Eight doubles at a time (`Lanes`): the type in which points are processed, and the few functions that laws need on it.
-/// Every function also takes plain doubles, so that a law is written once.
+/// Eight doubles at a time (`Lanes`): the type in which points are processed, and the few functions that laws need on
+/// it. Every function also takes plain doubles, so that a law is written once.
 
 #include <bit>
 #include <cmath>

@@ -51,7 +51,8 @@ Tensor<Dim, T> operator*(const Tensor<Dim, T>& a, const Tensor<Dim, T>& b) {
 template <int Dim, class T>
 T determinant(const Tensor<Dim, T>& a) {
   const auto& c = a.c;
-  if constexpr (Dim == 2) return (c[0] * c[3] - c[1] * c[2]) * c[4];
+  if constexpr (Dim == 2)
+    return (c[0] * c[3] - c[1] * c[2]) * c[4];
   else
     return c[0] * (c[4] * c[8] - c[5] * c[7]) - c[1] * (c[3] * c[8] - c[5] * c[6]) + c[2] * (c[3] * c[7] - c[4] * c[6]);
 }
@@ -104,8 +105,8 @@ Symmetric<Dim, T> scale_and_shift(const Symmetric<Dim, T>& a, T scale, T diagona
   return r;
 }
 
-/// F <- exp(A) F to second order in A = dt L. Forward Euler, (I + A) F, would grow det F by 4 % in a turn of 1000 steps;
-/// this grows it by less than 1e-6.
+/// F <- exp(A) F to second order in A = dt L. Forward Euler, (I + A) F, would grow det F by 4 % in a turn of 1000
+/// steps; this grows it by less than 1e-6.
 template <int Dim, class T>
 Tensor<Dim, T> advance_deformation(const Tensor<Dim, T>& A, const Tensor<Dim, T>& F) {
   Tensor<Dim, T> increment = A * A;

@@ -2,7 +2,6 @@
 /// Small fixed-size types used everywhere.
 
 #include <Eigen/Dense>
-
 #include <array>
 #include <cstdint>
 

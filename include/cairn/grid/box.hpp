@@ -1,10 +1,10 @@
 #pragma once
 /// Boxes of lattice positions (cells or nodes), half open: lower <= i < upper.
 
-#include "cairn/core/types.hpp"
-
 #include <algorithm>
 #include <cstddef>
+
+#include "cairn/core/types.hpp"
 
 namespace cairn {
 
@@ -55,7 +55,8 @@ struct Box {
 template <int Dim>
 Box<Dim> intersection(const Box<Dim>& a, const Box<Dim>& b) {
   Box<Dim> r;
-  for (int d = 0; d < Dim; ++d) r.lower[d] = std::max(a.lower[d], b.lower[d]), r.upper[d] = std::min(a.upper[d], b.upper[d]);
+  for (int d = 0; d < Dim; ++d)
+    r.lower[d] = std::max(a.lower[d], b.lower[d]), r.upper[d] = std::min(a.upper[d], b.upper[d]);
   return r;
 }
 
@@ -65,7 +66,8 @@ Box<Dim> hull(const Box<Dim>& a, const Box<Dim>& b) {
   if (a.empty()) return b;
   if (b.empty()) return a;
   Box<Dim> r;
-  for (int d = 0; d < Dim; ++d) r.lower[d] = std::min(a.lower[d], b.lower[d]), r.upper[d] = std::max(a.upper[d], b.upper[d]);
+  for (int d = 0; d < Dim; ++d)
+    r.lower[d] = std::min(a.lower[d], b.lower[d]), r.upper[d] = std::max(a.upper[d], b.upper[d]);
   return r;
 }
 

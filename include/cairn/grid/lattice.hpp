@@ -1,11 +1,11 @@
 #pragma once
-/// The background lattice and its division into patches. A patch is a box of cells: the unit of distribution and of load
-/// balance. Patch size belongs to the case, never to the rank count.
+/// The background lattice and its division into patches. A patch is a box of cells: the unit of distribution and of
+/// load balance. Patch size belongs to the case, never to the rank count.
+
+#include <vector>
 
 #include "cairn/core/types.hpp"
 #include "cairn/grid/box.hpp"
-
-#include <vector>
 
 namespace cairn {
 
@@ -26,11 +26,11 @@ class Lattice {
 
   const Vec<Dim>& lower() const { return lower_; }
   const Vec<Dim>& upper() const { return upper_; }
-  const Vec<Dim>& spacing() const { return spacing_; }           // cell size [m]
-  const Vec<Dim>& inverse_spacing() const { return inverse_; }   // [1/m]
+  const Vec<Dim>& spacing() const { return spacing_; }          // cell size [m]
+  const Vec<Dim>& inverse_spacing() const { return inverse_; }  // [1/m]
   const Index<Dim>& cells() const { return cells_; }
   bool periodic(int d) const { return periodic_[d]; }
-  double cell_volume() const { return spacing_.prod(); }         // [m^Dim]
+  double cell_volume() const { return spacing_.prod(); }  // [m^Dim]
   double smallest_spacing() const { return spacing_.minCoeff(); }
   double length(int d) const { return upper_[d] - lower_[d]; }
 
@@ -42,17 +42,18 @@ class Lattice {
   Index<Dim> patch_position(int patch) const;
   int patch_at(const Index<Dim>& position) const;
   Box<Dim> patch_cells(int patch) const;
-  /// Nodes that points of the patch can touch with any shape function: one beyond its cells on every side, two at a face.
+  /// Nodes that points of the patch can touch with any shape function: one beyond its cells on every side, two at a
+  /// face.
   Box<Dim> patch_nodes(int patch) const;
-  /// Where points may be, in cells from the lower corner along `d`: in the patch's cells, and half a cell beyond a face of
-  /// the domain, since contact with a wall is as soft as the material.
+  /// Where points may be, in cells from the lower corner along `d`: in the patch's cells, and half a cell beyond a face
+  /// of the domain, since contact with a wall is as soft as the material.
   std::array<double, 2> patch_reach(int patch, int d) const;
   /// The patch that holds a cell inside the lattice.
   int patch_of_cell(const Index<Dim>& cell) const;
   /// True where the patch answers for the node in sums over nodes: every node has one such patch.
   bool owns_node(int patch, const Index<Dim>& node) const;
-  /// Neighbours of a patch in ascending order of (patch, -shift): the order in which shared nodes are summed. A periodic
-  /// direction with one patch makes a patch its own neighbour.
+  /// Neighbours of a patch in ascending order of (patch, -shift): the order in which shared nodes are summed. A
+  /// periodic direction with one patch makes a patch its own neighbour.
   std::vector<Link<Dim>> links(int patch) const;
 
  private:
@@ -61,8 +62,8 @@ class Lattice {
   Vec<Dim> lower_, upper_, spacing_, inverse_;
   Index<Dim> cells_;
   std::array<bool, Dim> periodic_;
-  Index<Dim> patches_{};                           // patches in each direction
-  std::array<std::vector<int>, Dim> cuts_;         // first cell of each, and the end
+  Index<Dim> patches_{};                    // patches in each direction
+  std::array<std::vector<int>, Dim> cuts_;  // first cell of each, and the end
   int patch_count_ = 1;
 };
 

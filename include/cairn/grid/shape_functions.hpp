@@ -1,6 +1,6 @@
 #pragma once
-/// Shape functions as tensor products of one-dimensional weights. Each is a small struct that evaluates, for eight points
-/// at once, the values and slopes at its `nodes` consecutive nodes along one direction. Lengths in cells.
+/// Shape functions as tensor products of one-dimensional weights. Each is a small struct that evaluates, for eight
+/// points at once, the values and slopes at its `nodes` consecutive nodes along one direction. Lengths in cells.
 
 #include "cairn/core/lanes.hpp"
 #include "cairn/grid/lattice.hpp"
@@ -35,8 +35,8 @@ struct QuadraticShape {
   }
 };
 
-/// Generalised interpolation (Bardenhagen & Kober 2004): the hat function averaged over a point's own extent, which keeps
-/// its initial size ("uGIMP"). `half[d]` is half that extent, at most 1/2.
+/// Generalised interpolation (Bardenhagen & Kober 2004): the hat function averaged over a point's own extent, which
+/// keeps its initial size ("uGIMP"). `half[d]` is half that extent, at most 1/2.
 struct GimpShape {
   static constexpr int nodes = 3;
   std::array<double, 3> half;
@@ -63,9 +63,9 @@ struct GimpShape {
   }
 };
 
-/// Not an interpolation, but the weights of the density gradient of Bardenhagen, Brackbill & Sulsky 2000, eq. 24: density at
-/// cell centres by quadratic B-splines, its gradient at the nodes by differences. `slope` is minus that difference (so
-/// that sums of it point outwards like the other gradients) and `value` the mean of the two cells.
+/// Not an interpolation, but the weights of the density gradient of Bardenhagen, Brackbill & Sulsky 2000, eq. 24:
+/// density at cell centres by quadratic B-splines, its gradient at the nodes by differences. `slope` is minus that
+/// difference (so that sums of it point outwards like the other gradients) and `value` the mean of the two cells.
 struct CellDensityShape {
   static constexpr int nodes = 4;
   template <class T>

@@ -2,15 +2,15 @@
 /// The case: everything a run needs, parsed, checked and with all defaults filled in (INTERFACE: docs/case-file.md).
 /// Vectors have three components whatever the dimension; z is 0 in 2D. SI units.
 
-#include "cairn/body/shape.hpp"
-#include "cairn/core/options.hpp"
-
 #include <filesystem>
 #include <limits>
 #include <map>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "cairn/body/shape.hpp"
+#include "cairn/core/options.hpp"
 
 namespace cairn {
 
@@ -33,15 +33,15 @@ struct Time {
 
 struct Material {
   std::string name;
-  std::string model;                          // a name of material/registry.hpp
-  double density = 0;                         // [kg/m3]
-  std::map<std::string, double> parameters;   // keyed as in the law's table, every one filled in
+  std::string model;                         // a name of material/registry.hpp
+  double density = 0;                        // [kg/m3]
+  std::map<std::string, double> parameters;  // keyed as in the law's table, every one filled in
 };
 
 /// One body: its shape, material and rigid initial motion.
 struct BodySpec {
   Shape shape;
-  int material = 0;  // index into Case::materials
+  int material = 0;                      // index into Case::materials
   Vec3 velocity = Vec3::Zero();          // [m/s]
   Vec3 angular_velocity = Vec3::Zero();  // [rad/s] about the shape's centre
   std::string group;
@@ -50,8 +50,8 @@ struct BodySpec {
 
 /// Bodies moved as rigid parts. Exactly one of the three selections is used.
 struct Drive {
-  int overlapping = -1;    // index into face_names: bodies whose shape reaches across that face; -1: unused
-  double within = 0;       // with overlapping: or comes closer to it than this [m]
+  int overlapping = -1;  // index into face_names: bodies whose shape reaches across that face; -1: unused
+  double within = 0;     // with overlapping: or comes closer to it than this [m]
   std::vector<int> ids;
   std::string group;
   Vec3 velocity = Vec3::Zero();          // [m/s]

@@ -18,7 +18,8 @@ struct ElasticModuli {
 
   /// Objective elastic predictor: R sigma R^T + K tr(D) I + 2 G dev(D), A = dt L, D = sym(A) (Hughes & Winget 1980).
   template <int Dim, class T>
-  Symmetric<Dim, T> predict(const Tensor<Dim, T>& A, const Symmetric<Dim, T>& D, const Symmetric<Dim, T>& stress) const {
+  Symmetric<Dim, T> predict(const Tensor<Dim, T>& A, const Symmetric<Dim, T>& D,
+                            const Symmetric<Dim, T>& stress) const {
     Symmetric<Dim, T> s = rotate_by_spin(A, stress);
     const T spherical = (bulk - 2.0 / 3.0 * shear) * trace(D);
     for (int i = 0; i < symmetric_size<Dim>; ++i) s.c[i] += 2.0 * shear * D.c[i];

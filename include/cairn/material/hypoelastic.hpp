@@ -3,9 +3,9 @@
 /// integrated by the incrementally objective update of Hughes & Winget (1980). Its strain energy is the stress power,
 /// sum J sigma : D dt, since no potential belongs to this law.
 
-#include "cairn/material/elastic_moduli.hpp"
-
 #include <array>
+
+#include "cairn/material/elastic_moduli.hpp"
 
 namespace cairn {
 

@@ -3,9 +3,9 @@
 ///   W     = K/2 [(J^2 - 1)/2 - ln J] + G/2 (tr b_bar - 3)         per reference volume, b_bar = J^(-2/3) F F^T
 ///   sigma = K/2 (J - 1/J) I + (G/J) dev b_bar
 
-#include "cairn/material/elastic_moduli.hpp"
-
 #include <array>
+
+#include "cairn/material/elastic_moduli.hpp"
 
 namespace cairn {
 
@@ -19,8 +19,8 @@ struct NeoHookean {
   explicit NeoHookean(const ParameterValues& values) : moduli(values) {}
 
   /// New stress [Pa] from the new deformation gradient `F` with determinant `J`.
-  /// Returns the longitudinal modulus times the reference density over the current one [Pa], for the time step: exact for
-  /// pure changes of volume, within some per cent for large distortion.
+  /// Returns the longitudinal modulus times the reference density over the current one [Pa], for the time step: exact
+  /// for pure changes of volume, within some per cent for large distortion.
   template <int Dim, class T>
   T update(const Tensor<Dim, T>& /*A*/, const Tensor<Dim, T>& F, T J, Symmetric<Dim, T>& stress, T* /*state*/) const {
     const T inverse = 1.0 / J, root = inverse_cube_root(J);

@@ -13,7 +13,7 @@ namespace cairn {
 
 struct Parameter {
   std::string_view key, unit, meaning;
-  double lower = 0;          // least value allowed ...
+  double lower = 0;            // least value allowed ...
   bool lower_allowed = false;  // ... itself allowed or not
   double upper = std::numeric_limits<double>::infinity();
   std::optional<double> fallback = std::nullopt;  // the default; without one the key is required

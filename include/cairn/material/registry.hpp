@@ -1,13 +1,13 @@
 #pragma once
 /// The one list of constitutive laws. A new law is one header and one line here.
 
+#include <variant>
+
 #include "cairn/material/hypoelastic.hpp"
 #include "cairn/material/neo_hookean.hpp"
 #include "cairn/material/parameters.hpp"
 #include "cairn/material/rigid.hpp"
 #include "cairn/material/von_mises.hpp"
-
-#include <variant>
 
 namespace cairn {
 

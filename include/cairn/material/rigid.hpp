@@ -2,9 +2,9 @@
 /// A rigid body: it moves as prescribed, is never stressed, and counts as infinitely heavy in contact
 /// (Nairn 2013, eqs. 13-16).
 
-#include "cairn/material/elastic_moduli.hpp"
-
 #include <array>
+
+#include "cairn/material/elastic_moduli.hpp"
 
 namespace cairn {
 
@@ -17,7 +17,8 @@ struct Rigid {
   explicit Rigid(const ParameterValues& /*values*/) {}
 
   template <int Dim, class T>
-  T update(const Tensor<Dim, T>& /*A*/, const Tensor<Dim, T>& /*F*/, T /*J*/, Symmetric<Dim, T>& /*stress*/, T* /*state*/) const {
+  T update(const Tensor<Dim, T>& /*A*/, const Tensor<Dim, T>& /*F*/, T /*J*/, Symmetric<Dim, T>& /*stress*/,
+           T* /*state*/) const {
     return T{};
   }
   template <int Dim>

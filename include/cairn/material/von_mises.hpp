@@ -1,23 +1,23 @@
 #pragma once
-/// Von Mises plasticity with linear isotropic hardening: objective elastic predictor (Hughes & Winget 1980), radial return
-/// (Wilkins 1964; Simo & Hughes, box 3.1). Yield: sqrt(3/2) |dev sigma| <= yield_stress + hardening_modulus * e, with e the
-/// equivalent plastic strain.
-
-#include "cairn/material/elastic_moduli.hpp"
+/// Von Mises plasticity with linear isotropic hardening: objective elastic predictor (Hughes & Winget 1980), radial
+/// return (Wilkins 1964; Simo & Hughes, box 3.1). Yield: sqrt(3/2) |dev sigma| <= yield_stress + hardening_modulus * e,
+/// with e the equivalent plastic strain.
 
 #include <array>
+
+#include "cairn/material/elastic_moduli.hpp"
 
 namespace cairn {
 
 struct VonMises {
   static constexpr std::string_view name = "von_mises";
-  static constexpr std::array parameters = {
-      shear_modulus_parameter, bulk_modulus_parameter, Parameter{"yield_stress", "Pa", "initial yield stress in tension"},
-      Parameter{.key = "hardening_modulus",
-                .unit = "Pa",
-                .meaning = "slope of yield stress over equivalent plastic strain",
-                .lower_allowed = true,
-                .fallback = 0.0}};
+  static constexpr std::array parameters = {shear_modulus_parameter, bulk_modulus_parameter,
+                                            Parameter{"yield_stress", "Pa", "initial yield stress in tension"},
+                                            Parameter{.key = "hardening_modulus",
+                                                      .unit = "Pa",
+                                                      .meaning = "slope of yield stress over equivalent plastic strain",
+                                                      .lower_allowed = true,
+                                                      .fallback = 0.0}};
   static constexpr std::array<std::string_view, 3> state_names = {"plastic_strain", "stress_work", "plastic_work"};
   static constexpr bool rigid = false;
 

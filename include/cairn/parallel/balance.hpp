@@ -2,10 +2,10 @@
 /// Load balance: whole patches move between ranks when the measured work has become uneven. Measured times decide where
 /// patches live and nothing else, so that results stay the same bits.
 
+#include <mpi.h>
+
 #include "cairn/body/patch.hpp"
 #include "cairn/parallel/distribution.hpp"
-
-#include <mpi.h>
 
 namespace cairn {
 
@@ -16,8 +16,8 @@ double imbalance_of(const std::vector<std::int64_t>& work, const std::vector<int
 std::vector<int> keep_in_place(const std::vector<int>& parts, const std::vector<int>& owner,
                                const std::vector<std::int64_t>& work, int ranks);
 
-/// Sends every patch whose owner changes to its new rank, with its points, ledger and contacts. `patches` (ascending) and
-/// `owner` are replaced. Collective.
+/// Sends every patch whose owner changes to its new rank, with its points, ledger and contacts. `patches` (ascending)
+/// and `owner` are replaced. Collective.
 template <int Dim>
 void move_patches(std::vector<Patch<Dim>>& patches, std::vector<int>& owner, const std::vector<int>& new_owner,
                   const Lattice<Dim>& lattice, MPI_Comm comm);

@@ -1,13 +1,13 @@
 #pragma once
 /// The ranks of a run, and messages made of eight-byte words.
 
-#include "cairn/core/aligned.hpp"
-
 #include <mpi.h>
 
 #include <bit>
 #include <cstdint>
 #include <vector>
+
+#include "cairn/core/aligned.hpp"
 
 namespace cairn {
 
@@ -50,7 +50,9 @@ class NeighbourExchange {
 
   /// The message for a rank (a neighbour or this rank), emptied by `begin`.
   Message& outgoing(int rank) { return outgoing_[slot(rank)]; }
-  const Message& incoming(int rank) const { return slot(rank) == neighbours_.size() ? outgoing_.back() : incoming_[slot(rank)]; }
+  const Message& incoming(int rank) const {
+    return slot(rank) == neighbours_.size() ? outgoing_.back() : incoming_[slot(rank)];
+  }
   const std::vector<int>& neighbours() const { return neighbours_; }
   int rank() const { return rank_; }
   Traffic& traffic() { return traffic_; }

@@ -1,11 +1,11 @@
 #pragma once
 /// Which rank holds which patch. The table is the same on every rank; each computes it for itself.
 
-#include "cairn/core/options.hpp"
-#include "cairn/grid/lattice.hpp"
-
 #include <cstdint>
 #include <vector>
+
+#include "cairn/core/options.hpp"
+#include "cairn/grid/lattice.hpp"
 
 namespace cairn {
 

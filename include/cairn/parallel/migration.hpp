@@ -1,13 +1,13 @@
 #pragma once
 /// Points that left their patch go to the same body's piece in the patch where they are now.
 ///
-/// They are appended in the order (patch they come from, order there), so that pieces are the same on any number of ranks.
-/// Positions are wrapped at periodic boundaries and the crossings counted in the points' images.
+/// They are appended in the order (patch they come from, order there), so that pieces are the same on any number of
+/// ranks. Positions are wrapped at periodic boundaries and the crossings counted in the points' images.
+
+#include <string>
 
 #include "cairn/body/patch.hpp"
 #include "cairn/parallel/communicator.hpp"
-
-#include <string>
 
 namespace cairn {
 

@@ -1,11 +1,11 @@
 #pragma once
 /// Sums of nodal quantities over patches.
 ///
-/// Each patch sends, for every neighbouring patch and every piece that touches nodes both share, the box of shared nodes
-/// and the piece's own contributions there; it receives the like. A body that only the neighbour knows arrives as a ghost
-/// piece. Contributions are added in ascending order of (patch, the contributor's own node position), the patch's own
-/// included, so that every patch finds the same bits, wherever patches live. All messages between two ranks travel
-/// as one. Afterwards a patch holds complete sums on all nodes that its points touch.
+/// Each patch sends, for every neighbouring patch and every piece that touches nodes both share, the box of shared
+/// nodes and the piece's own contributions there; it receives the like. A body that only the neighbour knows arrives as
+/// a ghost piece. Contributions are added in ascending order of (patch, the contributor's own node position), the
+/// patch's own included, so that every patch finds the same bits, wherever patches live. All messages between two ranks
+/// travel as one. Afterwards a patch holds complete sums on all nodes that its points touch.
 
 #include "cairn/body/patch.hpp"
 #include "cairn/parallel/communicator.hpp"
@@ -53,16 +53,16 @@ class NodeExchange {
 
   void parse(std::vector<Patch<Dim>>& patches, int rank);
   void add_parts(Patch<Dim>& patch, std::vector<Part>& parts);
-  void add_to_piece(Piece<Dim>& piece, int links_before, const Part* begin, const Part* end, const Quantities& quantities,
-                    bool grow);
+  void add_to_piece(Piece<Dim>& piece, int links_before, const Part* begin, const Part* end,
+                    const Quantities& quantities, bool grow);
   void add_part(NodeBox<Dim>& nodes, const Part& part, const Quantities& quantities) const;
 
   NeighbourExchange& messages_;
   const std::vector<int>& owner_;
-  Quantities quantities_;                  // of start_sums
-  std::vector<Sent> sent_;                 // in the order of packing
-  std::vector<std::vector<Part>> parts_;   // for each patch, ordered by (body, link)
-  std::vector<int> position_;              // of each local patch by id, else -1
+  Quantities quantities_;                 // of start_sums
+  std::vector<Sent> sent_;                // in the order of packing
+  std::vector<std::vector<Part>> parts_;  // for each patch, ordered by (body, link)
+  std::vector<int> position_;             // of each local patch by id, else -1
 };
 
 }  // namespace cairn

@@ -5,14 +5,13 @@
 /// a file does not depend on the ranks that wrote it. For every patch and column it holds a checksum of the values as
 /// they were in memory, besides the seal over the whole file (io/checkpoint_file.hpp). Layout: docs/restart.md.
 
-#include <mpi.h>
-
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "cairn/io/checkpoint_file.hpp"
+#include "cairn/parallel/communicator.hpp"
 #include "cairn/solver/run_state.hpp"
 
 namespace cairn {

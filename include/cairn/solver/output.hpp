@@ -1,15 +1,16 @@
 #pragma once
 /// Result files of a run, as columns of the simulation's state. Names and layout: docs/results.md.
 
-#include "cairn/solver/simulation.hpp"
-
 #include <filesystem>
+
+#include "cairn/solver/simulation.hpp"
 
 namespace cairn {
 
 /// Writes the material points with the fields asked for. Collective.
 template <int Dim>
-void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file, const std::vector<std::string>& fields);
+void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file,
+                     const std::vector<std::string>& fields);
 
 /// Writes one row for each body. Collective.
 template <int Dim>

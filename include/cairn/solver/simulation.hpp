@@ -1,6 +1,10 @@
 #pragma once
 /// The solver: the state of one rank and the step.
 
+#include <functional>
+#include <memory>
+#include <optional>
+
 #include "cairn/boundary/faces.hpp"
 #include "cairn/io/case.hpp"
 #include "cairn/parallel/migration.hpp"
@@ -8,19 +12,15 @@
 #include "cairn/solver/timers.hpp"
 #include "cairn/transfer/transfer.hpp"
 
-#include <functional>
-#include <memory>
-#include <optional>
-
 namespace cairn {
 
 /// What the solver needs of a material.
 struct SolverMaterial {
   std::string name;
   Law law;
-  double density;                            // [kg/m3]
+  double density;  // [kg/m3]
   bool rigid = false;
-  double longitudinal_modulus = 0;           // [Pa]
+  double longitudinal_modulus = 0;  // [Pa]
   std::vector<std::string_view> state_names;
 };
 
@@ -36,8 +36,8 @@ struct Totals {
 
 /// Where the stepping stands: with the points, all that the next step depends on.
 struct StepState {
-  double time = 0, dt = 0;                  // dt: of the last step [s]
-  double wave_speed = 0, point_speed = 0;   // largest over all points, for the next dt [m/s]
+  double time = 0, dt = 0;                 // dt: of the last step [s]
+  double wave_speed = 0, point_speed = 0;  // largest over all points, for the next dt [m/s]
   std::int64_t steps = 0;
 };
 
@@ -53,8 +53,8 @@ template <int Dim>
 class Simulation {
  public:
   /// Places the points of the case's bodies, or takes them from a checkpoint. Collective.
-  /// \throws InputError on every rank for a body without points, a checkpoint that does not fit, or points for which this
-  /// machine has too little memory
+  /// \throws InputError on every rank for a body without points, a checkpoint that does not fit, or points for which
+  /// this machine has too little memory
   Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from = nullptr);
 
   /// Advances one step of at most `longest` seconds. Collective.
@@ -99,21 +99,21 @@ class Simulation {
  private:
   // The stages of a step, in order. Those marked (*) communicate.
   void choose_time_step(double longest);
-  void project_points();                 // (*)
+  void project_points();  // (*)
   void contact_before_update();
-  void strain_first(double share);       // (*)
+  void strain_first(double share);  // (*)
   void contact_after_update(bool last);
   void accelerate_points(bool again);
-  void project_again();                  // (*)
+  void project_again();  // (*)
   void strain_last(double share);
   void move_points();
-  void migrate_points();                 // (*)
+  void migrate_points();  // (*)
 
   void place_points(const Case& c);
   void restore(const Checkpoint& from);
   void make_patches(const std::vector<std::int64_t>& points);  // of every patch; those of this rank, without points
-  void connect_patches();                // after patches came or went
-  void balance();                        // (*)
+  void connect_patches();                                      // after patches came or went
+  void balance();                                              // (*)
 
   /// Calls f(position, patch) for every patch and notes the processor time that it takes.
   template <class F>
@@ -156,7 +156,7 @@ class Simulation {
 
   double time_ = 0, dt_ = 0;
   std::int64_t steps_ = 0, total_points_ = 0;
-  SpeedLimits speeds_;                            // of this rank, in the step under way
+  SpeedLimits speeds_;  // of this rank, in the step under way
   static constexpr int speed_size = 5;
   double speed_message_[speed_size] = {}, speed_result_[speed_size] = {};  // wave, point, failure, stop, wall
   std::function<Notice()> ask_;

@@ -45,8 +45,8 @@ void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSetti
 
 /// nodes -> points: strain over `dt` from the nodal velocity, deformation gradient and stress; raises `speeds.wave`.
 template <int Dim>
-void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, const Law& law,
-                   double density, double dt, SpeedLimits& speeds);
+void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                   const Law& law, double density, double dt, SpeedLimits& speeds);
 
 /// As update_stress, and points -> nodes: the force of the new stress, in the same pass.
 template <int Dim>
@@ -59,7 +59,8 @@ void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSe
 
 /// points -> nodes: momentum alone, at the positions of the last projection, into NodeBox::velocity [kg m/s].
 template <int Dim>
-void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density);
+void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                      double density);
 
 /// Both of these in one pass.
 template <int Dim>
@@ -68,7 +69,8 @@ void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
 
 /// nodes -> points: x_p += dt sum N v (eq. 10); raises `speeds.point`.
 template <int Dim>
-void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt, SpeedLimits& speeds);
+void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt,
+          SpeedLimits& speeds);
 
 /// nodes: NodeMotion from sums and force: a = f/m, v = p/m + dt a (eq. 9).
 template <int Dim>
