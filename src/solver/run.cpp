@@ -240,9 +240,11 @@ class Run {
   }
 
   void report(double step_wall) const {
-    const std::int64_t sent[2] = {simulation_.traffic().messages, simulation_.traffic().bytes};
-    std::int64_t most_sent[2] = {0, 0};
-    MPI_Reduce(sent, most_sent, 2, MPI_INT64_T, MPI_MAX, 0, comm_);
+    std::int64_t points = 0;
+    for (const auto& patch : simulation_.patches()) points += patch.point_count();
+    const std::int64_t mine[3] = {simulation_.traffic().messages, simulation_.traffic().bytes, points};
+    std::int64_t most[3] = {0, 0, 0};
+    MPI_Reduce(mine, most, 3, MPI_INT64_T, MPI_MAX, 0, comm_);
     if (rank_ != 0) return;
     double total = 0;
     std::string shares;
@@ -254,9 +256,11 @@ class Run {
     fmt::print("time of rank 0:{}\n", shares);
     if (settings_.profile) {
       const double steps = std::max(1.0, steps_here());
-      fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", sent[0] / steps, sent[1] / steps);
-      fmt::print("most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most_sent[0] / steps,
-                 most_sent[1] / steps);
+      fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
+      fmt::print("most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
+      const double mean = static_cast<double>(simulation_.total_points()) / ranks_;
+      fmt::print("balance: largest over mean points {:.3f}, patches moved {} times\n",
+                 static_cast<double>(most[2]) / mean, simulation_.times_balanced());
     }
     RunSummary s;
     s.steps = simulation_.steps() - steps_before_, s.points = simulation_.total_points(), s.time = simulation_.time();

@@ -261,6 +261,7 @@ void Simulation<Dim>::balance() {
   const auto owner = keep_in_place(parts, owner_, work, ranks_);
   if (imbalance_of(work, owner, ranks_) > 0.95 * now) return;
   move_patches(patches_, owner_, owner, lattice_, comm_);
+  ++times_balanced_;
   connect_patches();
 }
 

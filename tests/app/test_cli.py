@@ -174,7 +174,7 @@ def test_point_leaves(cairn: Program, here: Path):
         expect(found, done.err)
         reports.append(done.err)
         rows = (here / f"out{ranks}" / "history.csv").read_text().splitlines()
-        expect(len(rows) == int(found[1]) + 2, f"{len(rows)} lines in history.csv; {done.err}")
+        expect(len(rows) == int(found[1]) + 1, f"{len(rows)} lines in history.csv; {done.err}")
         expect(rows[-1].count(",") == rows[0].count(","), "the last line of history.csv is not whole")
         for file in (here / f"out{ranks}").glob("*.vtkhdf"):
             expect_code(cairn("info", file, cwd=here), 0)
