@@ -64,13 +64,13 @@ void NodeExchange<Dim>::finish_sums(std::vector<Patch<Dim>>& patches) {
   position_.assign(owner_.size(), -1);
   for (std::size_t p = 0; p < patches.size(); ++p) position_[patches[p].id] = static_cast<int>(p);
   parts_.assign(patches.size(), {});
-  parse(patches, messages_.rank());
-  for (int rank : messages_.neighbours()) parse(patches, rank);
+  parse(messages_.rank());
+  for (int rank : messages_.neighbours()) parse(rank);
   for (std::size_t p = 0; p < patches.size(); ++p) add_parts(patches[p], parts_[p]);
 }
 
 template <int Dim>
-void NodeExchange<Dim>::parse(std::vector<Patch<Dim>>& /*patches*/, int rank) {
+void NodeExchange<Dim>::parse(int rank) {
   const Message& message = messages_.incoming(rank);
   for (std::size_t at = 0; at < message.size();) {
     Part part;

@@ -41,7 +41,7 @@ void for_chunks(const Points<Dim>& points, const Lattice<Dim>& lattice, const Bo
   }
 }
 
-/// The deformation gradient's determinant of eight points.
+/// The deformation gradient of eight points.
 template <int Dim>
 Tensor<Dim, Lanes> load_deformation(const Points<Dim>& points, int first) {
   Tensor<Dim, Lanes> F;

@@ -51,7 +51,7 @@ class NodeExchange {
   };
   using Quantities = std::vector<NodeQuantity<Dim>>;
 
-  void parse(std::vector<Patch<Dim>>& patches, int rank);
+  void parse(int rank);
   void add_parts(Patch<Dim>& patch, std::vector<Part>& parts);
   void add_to_piece(Piece<Dim>& piece, int links_before, const Part* begin, const Part* end,
                     const Quantities& quantities, bool grow);
