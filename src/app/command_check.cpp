@@ -4,6 +4,7 @@
 
 #include "cairn/body/pack.hpp"
 #include "cairn/body/points.hpp"
+#include "cairn/material/registry.hpp"
 #include "commands.hpp"
 #include "report.hpp"
 
@@ -40,12 +41,17 @@ struct Estimate {
   double points = 0, bytes = 0;
 };
 
+double bytes_of_point(const Material& material, int dimension) {
+  const std::size_t states =
+      std::visit([](const auto& law) { return law.state_names.size(); }, make_law(material.model, material.parameters));
+  return 16.0 + 8.0 * (states + (dimension == 2 ? PointColumns<2>::state : PointColumns<3>::state));
+}
+
 /// Points from the volumes, memory from the points and the nodes that the bodies reach.
 Estimate estimate(const Case& c) {
   const int dim = c.domain.dimension;
   const Domain& d = c.domain;
-  constexpr double state_columns = 3, node_columns[] = {12, 16};
-  const double point_bytes = 16 + 8 * (state_columns + (dim == 2 ? PointColumns<2>::state : PointColumns<3>::state));
+  constexpr double node_columns[] = {12, 16};
   const Vec3 h = (d.upper - d.lower).cwiseQuotient(Vec3(d.cells[0], d.cells[1], d.cells[2]));
   const double cell = h[0] * h[1] * (dim == 3 ? h[2] : 1.0);
   Estimate result;
@@ -53,10 +59,10 @@ Estimate estimate(const Case& c) {
     const Bounds b = bounds(body.shape);
     double nodes = 1;
     for (int k = 0; k < dim; ++k) nodes *= std::min(b.upper[k] - b.lower[k], d.upper[k] - d.lower[k]) / h[k] + 4;
-    result.points += volume_of(body.shape, d) / cell * c.solver.points_per_cell;
-    result.bytes += nodes * 8 * node_columns[dim - 2];
+    const double points = volume_of(body.shape, d) / cell * c.solver.points_per_cell;
+    result.points += points;
+    result.bytes += nodes * 8 * node_columns[dim - 2] + 1.25 * points * bytes_of_point(c.materials[body.material], dim);
   }
-  result.bytes += result.points * point_bytes * 1.25;
   return result;
 }
 

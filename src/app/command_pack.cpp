@@ -3,6 +3,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/pack_spec.hpp"
+#include "cairn/io/result_files.hpp"
 #include "commands.hpp"
 #include "report.hpp"
 
@@ -26,7 +27,8 @@ int command_pack(const PackArguments& arguments) {
     const PackSpec spec = read_pack_spec(arguments.spec);
     check_target(arguments.out);
     const Pack pack = pack_grains(spec);
-    write_pack(arguments.out, pack, spec);
+    const std::string error = replace_file(arguments.out, pack_table(pack, spec));
+    if (!error.empty()) throw RunError(error);
     fmt::print("{}: {} grains, fraction {:.4f}, mean diameter {:.4g} m, largest overlap {:.2g} of the smaller radius\n",
                arguments.out.string(), pack.radius.size(), pack.fraction, pack.mean_diameter, pack.max_overlap);
   });

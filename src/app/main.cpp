@@ -100,6 +100,7 @@ int main(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
   MPI_Init(&argc, &argv);
+  cairn::app::prepare_for_failures();
   int code = cairn::app::done;
   const auto failure = cairn::app::attempt([&] { code = cairn::app::dispatch(argc, argv); });
   if (failure) code = cairn::app::settle(failure);

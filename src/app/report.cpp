@@ -14,7 +14,7 @@
 namespace cairn::app {
 namespace {
 
-constexpr auto patience = std::chrono::seconds(15);
+constexpr auto patience = std::chrono::seconds(5);
 
 /// A communicator of its own, so that reports never meet messages of the work.
 MPI_Comm report_communicator() {
@@ -46,7 +46,29 @@ void wait_for_all(MPI_Request& request, const std::optional<Failure>& failure) {
   }
 }
 
+/// Memory set aside for the report that there is none; MPI_Abort, too, needs some.
+std::vector<char>& reserve() {
+  static std::vector<char> bytes;
+  return bytes;
+}
+
+/// Ends the job where memory runs out on one of several ranks: the others would wait for it for ever, and it could not
+/// even take its objects apart, whose messages they do not answer.
+void end_job_without_memory() {
+  std::vector<char>().swap(reserve());
+  std::fputs("cairn failed: a rank is out of memory; use fewer points, or more ranks on more machines\n", stderr);
+  MPI_Abort(MPI_COMM_WORLD, failed);
+}
+
 }  // namespace
+
+void prepare_for_failures() {
+  int ranks = 1;
+  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  if (ranks == 1) return;
+  reserve().reserve(std::size_t{8} << 20);
+  std::set_new_handler(end_job_without_memory);
+}
 
 int rank() {
   int rank = 0;

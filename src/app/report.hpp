@@ -19,6 +19,9 @@ struct Failure {
 
 int rank();
 
+/// Sees to it that a rank that runs out of memory ends the job. Call after MPI_Init.
+void prepare_for_failures();
+
 /// Runs the work; a thrown exception becomes a failure.
 std::optional<Failure> attempt(const std::function<void()>& work);
 

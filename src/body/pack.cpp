@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/memory.hpp"
 #include "pack_detail.hpp"
 
 namespace cairn {
@@ -15,6 +16,8 @@ namespace {
 using namespace pack_detail;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double most_grains = 1e8;
+constexpr double shortest = 1e-30, longest = 1e30;  // [m]: their volumes are numbers with room to spare
 
 void check_numbers(const PackSpec& spec, std::vector<std::string>& errors) {
   if (spec.dimension != 2 && spec.dimension != 3) {
@@ -25,9 +28,12 @@ void check_numbers(const PackSpec& spec, std::vector<std::string>& errors) {
     if (!(spec.upper[k] > spec.lower[k]) || !std::isfinite(spec.upper[k] - spec.lower[k])) {
       errors.push_back(fmt::format("pack.lower, pack.upper: the box has no extent along {}, from {:.4g} to {:.4g}",
                                    "xyz"[k], spec.lower[k], spec.upper[k]));
+    } else if (const double length = spec.upper[k] - spec.lower[k]; length < shortest || length > longest) {
+      errors.push_back(fmt::format("pack.lower, pack.upper: the box is {:.4g} m long along {}; must be from {} to {}",
+                                   length, "xyz"[k], shortest, longest));
     }
   }
-  if (spec.count < 0 || spec.count > 100000000) {
+  if (spec.count < 0 || spec.count > most_grains) {
     errors.push_back(fmt::format("pack.count = {}: must be from 1 to 1e8, or left out", spec.count));
   }
   if (!(spec.fraction >= 0 && spec.fraction < 1)) {
@@ -39,6 +45,7 @@ void check_numbers(const PackSpec& spec, std::vector<std::string>& errors) {
   if (!(spec.max_overlap > 0 && spec.max_overlap < 0.1)) {
     errors.push_back(fmt::format("pack.max_overlap = {}: must be above 0 and below 0.1", spec.max_overlap));
   }
+  if (!(spec.effort > 0)) errors.push_back(fmt::format("pack.effort = {}: must be above 0", spec.effort));
 }
 
 void check_range(const SizeSpec& s, bool needs_room, std::vector<std::string>& errors) {
@@ -89,6 +96,32 @@ void check_sizes(const PackSpec& spec, std::vector<std::string>& errors) {
           (!s.weights.empty() && std::none_of(s.weights.begin(), s.weights.end(), [](double v) { return v > 0; }))) {
         errors.push_back("sizes.weights: must not be below 0, and one at least above 0");
       }
+  }
+}
+
+/// Diameters are numbers of a size that can be reckoned with.
+void check_lengths(const SizeSpec& s, std::vector<std::string>& errors) {
+  const auto check = [&](const char* key, double d) {
+    if (d == 0 || (d >= shortest && d <= longest)) return;  // 0: not given
+    errors.push_back(fmt::format("{} = {:.4g}: must be from {} to {}", key, d, shortest, longest));
+  };
+  check("sizes.min", s.min), check("sizes.max", s.max), check("sizes.mean", s.mean);
+  if (!s.diameters.empty()) {
+    check("sizes.diameters", *std::ranges::min_element(s.diameters));
+    check("sizes.diameters", *std::ranges::max_element(s.diameters));
+  }
+}
+
+/// Refuses more grains than there is memory for, before any of them is made.
+void check_memory(const PackSpec& spec, std::vector<std::string>& errors) {
+  constexpr double grain_bytes = 600;  // columns, neighbours and cells
+  const double count = expected_count(spec), memory = std::min(available_memory(), memory_limit());
+  const std::string key = spec.count > 0 ? "pack.count" : "pack.fraction, [sizes]";
+  if (!(count <= most_grains)) {
+    errors.push_back(fmt::format("{}: about {:.3g} grains; there may be {:.3g}", key, count, most_grains));
+  } else if (count * grain_bytes > memory) {
+    errors.push_back(fmt::format("{}: about {:.3g} grains need {:.3g} GB of memory, there are {:.3g} GB", key, count,
+                                 1e-9 * count * grain_bytes, 1e-9 * memory));
   }
 }
 
@@ -198,15 +231,16 @@ void Packing<Dim>::fail(const Overlap& left) const {
   throw RunError(fmt::format(
       "pack: not reached: {} grains at fraction {:.4f} still overlap by {:.2g} of the smaller radius, {:.2g} is "
       "allowed, "
-      "after {} iterations; ask for a lower fraction (try {:.2f}), a wider range of sizes, another seed, or a larger "
-      "pack.max_overlap",
+      "after {} iterations; ask for a lower fraction (try {:.2f}), a wider range of sizes, another seed, more "
+      "pack.effort or a larger pack.max_overlap",
       diameters_.size(), pack_.fraction, left.largest, spec_.max_overlap, pack_.iterations, lower));
 }
 
 template <int Dim>
 Pack Packing<Dim>::make() {
   const double n = static_cast<double>(diameters_.size());
-  double budget = std::max(3e8, 4e4 * n);  // grains times iterations: seconds for a few hundred, minutes for 1e5
+  double budget =
+      spec_.effort * std::max(3e8, 4e4 * n);  // grains times iterations: seconds for a few hundred, minutes for 1e5
   set_sizes();
   place(grains_, identity_, random_, pack_.iterations, budget);
   constexpr int most_refits = 6;
@@ -249,6 +283,8 @@ std::vector<std::string> check_pack(const PackSpec& spec) {
   std::vector<std::string> errors;
   check_numbers(spec, errors);
   check_sizes(spec, errors);
+  check_lengths(spec.sizes, errors);
+  if (errors.empty()) check_memory(spec, errors);
   if (!errors.empty()) return errors;
   const std::vector<double> diameters = draw_diameters(spec, {}, errors);
   if (errors.empty()) check_room(spec, diameters, errors);

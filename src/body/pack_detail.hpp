@@ -32,6 +32,9 @@ double expected_loss(const PackSpec& spec, const std::vector<double>& diameters)
 /// (fit and scale); empty: from the spec. What is wrong is added to `errors`; the result is then of no use.
 std::vector<double> draw_diameters(const PackSpec& spec, std::optional<double> solid, std::vector<std::string>& errors);
 
+/// About how many grains there will be, without a limit.
+double expected_count(const PackSpec& spec);
+
 /// True where sizes adapt to the fraction.
 bool sizes_adapt(const PackSpec& spec);
 
@@ -86,7 +89,7 @@ class LevelGrid {
   template <class F>
   void visit(const std::array<double, Dim>& x, double reach, int finest, const F& f) const {
     for (int l = 0; l <= finest; ++l) {
-      if (levels_[l].filled) visit_level(levels_[l], x, reach, f);
+      if (!levels_[l].head.empty()) visit_level(levels_[l], x, reach, f);
     }
   }
   int finest() const { return static_cast<int>(levels_.size()) - 1; }
@@ -96,8 +99,7 @@ class LevelGrid {
     std::array<int, Dim> cells;
     std::array<double, Dim> inverse_size;
     double largest;         // radius
-    std::vector<int> head;  // first grain of each cell
-    bool filled = false;
+    std::vector<int> head;  // first grain of each cell; empty where the level has no grains
   };
   template <class F>
   void visit_level(const Level& level, const std::array<double, Dim>& x, double reach, const F& f) const;

@@ -17,13 +17,10 @@ LevelGrid<Dim>::LevelGrid(const Box<Dim>& box, const Column& radius)
   for (int l = 0; l < count; ++l) {
     Level& level = levels_[l];
     level.largest = std::ldexp(largest_, -l);
-    std::size_t cells = 1;
     for (int k = 0; k < Dim; ++k) {
       level.cells[k] = std::clamp(static_cast<int>(std::min(1e9, box.length[k] / (2 * level.largest))), 1, most);
       level.inverse_size[k] = level.cells[k] / box.length[k];
-      cells *= level.cells[k];
     }
-    level.head.assign(cells, -1);
   }
 }
 
@@ -47,10 +44,15 @@ std::size_t LevelGrid<Dim>::cell_of(int l, const std::array<double, Dim>& x) con
 template <int Dim>
 void LevelGrid<Dim>::insert(int grain, double radius, const std::array<double, Dim>& x) {
   const int l = level_of(radius);
-  int& head = levels_[l].head[cell_of(l, x)];
+  Level& level = levels_[l];
+  if (level.head.empty()) {  // most levels of a wide range of sizes stay without grains
+    std::size_t cells = 1;
+    for (int n : level.cells) cells *= static_cast<std::size_t>(n);
+    level.head.assign(cells, -1);
+  }
+  int& head = level.head[cell_of(l, x)];
   next_[grain] = head;
   head = grain;
-  levels_[l].filled = true;
 }
 
 template <int Dim>

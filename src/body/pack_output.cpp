@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numbers>
 
-#include "cairn/core/error.hpp"
 #include "pack_detail.hpp"
 
 namespace cairn {
@@ -121,15 +119,13 @@ double volume_inside(int dimension, const Vec3& centre, double radius, const Vec
   return dimension == 2 ? disk_inside(radius, low, high) : sphere_inside(radius, low, high);
 }
 
-void write_pack(const std::filesystem::path& path, const Pack& pack, const PackSpec& spec) {
-  std::ofstream file(path);
-  file << comments(pack, spec) << (spec.dimension == 2 ? "x,y,r\n" : "x,y,z,r\n");
+std::string pack_table(const Pack& pack, const PackSpec& spec) {
+  std::string text = comments(pack, spec) + (spec.dimension == 2 ? "x,y,r\n" : "x,y,z,r\n");
   for (std::size_t i = 0; i < pack.radius.size(); ++i) {
-    for (int k = 0; k < spec.dimension; ++k) file << fmt::format("{},", pack.centre[i][k]);
-    file << fmt::format("{}\n", pack.radius[i]);
+    for (int k = 0; k < spec.dimension; ++k) text += fmt::format("{},", pack.centre[i][k]);
+    text += fmt::format("{}\n", pack.radius[i]);
   }
-  file.close();
-  if (!file) throw RunError(fmt::format("pack: cannot write {}", path.string()));
+  return text;
 }
 
 }  // namespace cairn

@@ -226,8 +226,7 @@ double expected_inside(const PackSpec& spec, const std::vector<double>& d) {
 /// which lacks some of a long tail.
 int derive_count(const PackSpec& spec) {
   const double wanted = spec.fraction * box_volume(spec), most = 1e8;
-  const double mean = expected_inside(spec, draw_shape(spec, nominal_count)) / nominal_count;
-  int count = static_cast<int>(std::lround(std::clamp(wanted / mean, 1.0, most)));
+  int count = static_cast<int>(std::lround(std::clamp(expected_count(spec), 1.0, most)));
   for (int i = 0; i < 4; ++i) {
     const double inside = expected_inside(spec, draw_shape(spec, count));
     count = static_cast<int>(std::lround(std::clamp(count * wanted / inside, 1.0, most)));
@@ -270,6 +269,12 @@ double expected_loss(const PackSpec& spec, const std::vector<double>& diameters)
     }
   }
   return loss;
+}
+
+double expected_count(const PackSpec& spec) {
+  if (spec.count > 0) return spec.count;
+  const double mean = expected_inside(spec, draw_shape(spec, nominal_count)) / nominal_count;
+  return spec.fraction * box_volume(spec) / mean;
 }
 
 bool sizes_adapt(const PackSpec& spec) {

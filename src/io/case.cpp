@@ -20,13 +20,14 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   draft.domain_known = errors.count() == before;
   read_time(root.table("time"), c.time);
   read_solver(root.table("solver"), c.domain.dimension, c.solver);
-  read_materials(root.table("materials"), c.materials);
+  read_materials(root.table("materials"), c.domain.dimension, c.materials);
   read_contact(root.table("contact"), c.materials, c.contact);
   read_bodies(root, draft, errors);
   read_grains(root, draft, errors);
   if (!root.has("bodies") && !root.has("grains"))
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   read_drives(root, draft);
+  check_pressures(draft, errors);
   read_boundary(root.table("boundary"), c.domain, c.faces);
   read_parallel(root.table("parallel"), c.parallel);
   read_output(root.table("output"), draft, c.output);

@@ -12,11 +12,7 @@
 namespace cairn::reading {
 namespace {
 
-const LawInfo* find_law(std::string_view name) {
-  for (const auto& law : law_infos())
-    if (law.name == name) return &law;
-  return nullptr;
-}
+constexpr int most_pressure_errors = 20;  // reported for one case
 
 bool has_parameter(const LawInfo& law, std::string_view key) {
   return std::ranges::find(law.parameters, key, &Parameter::key) != law.parameters.end();
@@ -46,7 +42,36 @@ bool read_youngs_pair(Table& table, const LawInfo& law, ParameterValues& values)
   return true;
 }
 
-Material read_material(Table table, const std::string& name) {
+/// An array of 1 to `p.most` numbers, each under its own key.
+void read_list(Table& table, const Parameter& p, const Range& range, ParameterValues& values) {
+  const std::size_t before = table.error_count();
+  const auto list = table.numbers(p.key, range);
+  if (table.error_count() != before) return;
+  if (list.empty() || std::ssize(list) > p.most)
+    return table.error(p.key, fmt::format("holds {} numbers; must hold 1 to {}", list.size(), p.most));
+  for (std::ptrdiff_t i = 0; i < std::ssize(list); ++i) values[list_key(p.key, i)] = list[i];
+  if (p.as_many_as.empty() || !values.contains(list_key(p.as_many_as, 0))) return;
+  std::size_t other = 0;
+  while (values.contains(list_key(p.as_many_as, other))) ++other;
+  if (other != list.size())
+    table.error(p.key,
+                fmt::format("holds {} numbers, {} holds {}; both must hold as many", list.size(), p.as_many_as, other));
+}
+
+Plane read_plane(Table& table, const LawInfo& law, int dimension) {
+  if (!table.has("plane")) return Plane::strain;
+  const Plane plane = table.choice("plane", plane_names, Plane::strain);
+  if (dimension != 2) {
+    table.error("plane",
+                "is only for 2D; the case has dimension 3, where stress and strain are as the motion makes them");
+  } else if (!law.has_plane_stress) {
+    table.error("plane",
+                fmt::format("the model {} has no plane of stress or strain; remove this key", in_quotes(law.name)));
+  }
+  return plane;
+}
+
+Material read_material(Table table, const std::string& name, int dimension) {
   Material material;
   material.name = name;
   std::vector<std::string_view> models;
@@ -67,10 +92,13 @@ Material read_material(Table table, const std::string& name) {
     const Range range{p.lower, p.upper, !p.lower_allowed};
     if (!table.has(key) && !p.fallback) {
       table.missing(key, fmt::format("is missing; the {} [{}] {}", p.meaning, p.unit, range.text()));
+    } else if (p.most > 0) {
+      read_list(table, p, range, material.parameters);
     } else {
       material.parameters[key] = table.number(key, p.fallback, range);
     }
   }
+  material.plane = read_plane(table, law, dimension);
   table.finish();
   return material;
 }
@@ -150,8 +178,8 @@ Vec3 read_angular_velocity(Table& table, int dimension) {
   return {0, 0, table.number("angular_velocity", 0.0)};
 }
 
-void read_materials(Table materials, std::vector<Material>& result) {
-  for (const auto& name : materials.keys()) result.push_back(read_material(materials.table(name), name));
+void read_materials(Table materials, int dimension, std::vector<Material>& result) {
+  for (const auto& name : materials.keys()) result.push_back(read_material(materials.table(name), name, dimension));
   if (result.empty()) materials.missing("", "no material is given; give at least one table [materials.NAME]");
 }
 
@@ -173,6 +201,7 @@ void read_bodies(Table& root, Draft& draft, Errors& errors) {
     body.material = read_material_name(table, draft.result.materials, true);
     body.velocity = table.vector("velocity", domain.dimension, Vec3::Zero().eval());
     body.angular_velocity = read_angular_velocity(table, domain.dimension);
+    body.initial_pressure = table.number("initial_pressure", 0.0);
     body.group = table.text("group", "");
     table.finish();
     draft.result.bodies.push_back(std::move(body));
@@ -188,6 +217,7 @@ void read_grains(Table& root, Draft& draft, Errors& errors) {
     spec.material = read_material_name(table, draft.result.materials, false);
     spec.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
     spec.angular_velocity = read_angular_velocity(table, dimension);
+    spec.initial_pressure = table.number("initial_pressure", 0.0);
     spec.group = table.text("group", "");
     table.finish();
     const bool known = std::exchange(draft.bodies_known, false);  // until the table has been read
@@ -227,6 +257,27 @@ void read_drives(Table& root, Draft& draft) {
                                         "[...] }}, {{ group = \"...\" }}",
                                         given));
     draft.result.drives.push_back(std::move(drive));
+  }
+}
+
+void check_pressures(const Draft& draft, Errors& errors) {
+  const Case& c = draft.result;
+  int reported = 0;
+  for (int i = 0; i < std::ssize(c.bodies) && reported < most_pressure_errors; ++i) {
+    const BodySpec& body = c.bodies[i];
+    if (body.initial_pressure == 0 || body.material < 0 || body.material >= std::ssize(c.materials)) continue;
+    const Material& material = c.materials[body.material];
+    const LawInfo* law = find_law(material.model);
+    std::string problem;
+    if (law && !law->has_pressure)
+      problem = fmt::format("the model {} of the body's material carries no stress", in_quotes(law->name));
+    else if (material.plane == Plane::stress)
+      problem = "the body's material is in plane stress, which a hydrostatic pressure is not";
+    else if (std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, i, c.domain); }))
+      problem = "the body is moved by a drive and carries no stress";
+    if (problem.empty()) continue;
+    errors.add({body.source, 0}, "initial_pressure", problem + "; remove this key or set it to 0");
+    ++reported;
   }
 }
 

@@ -113,6 +113,7 @@ std::uint64_t bodies_checksum(const Case& c) {
     add.all(body.shape);
     add.add(static_cast<double>(body.material));
     add.add(body.velocity), add.add(body.angular_velocity);
+    if (body.initial_pressure != 0) add.add(body.initial_pressure);
     add.add(static_cast<double>(body.group.size()));
     sum.add_values(std::span(body.group.data(), body.group.size()));
   }

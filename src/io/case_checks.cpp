@@ -28,7 +28,7 @@ class OverlapSearch {
   OverlapSearch(const Case& c) : domain_(c.domain) {
     for (std::size_t i = 0; i < c.bodies.size(); ++i)
       if (const auto* ball = std::get_if<Ball>(&c.bodies[i].shape)) {
-        const int level = static_cast<int>(std::ceil(std::log2(2 * ball->radius)));
+        const int level = static_cast<int>(std::ceil(std::log2(ball->radius) + 1));
         discs_.push_back({ball->centre, ball->radius, static_cast<int>(i), level});
         largest_ = std::max(largest_, ball->radius);
         if (std::ranges::find(levels_, level) == levels_.end()) levels_.push_back(level);
@@ -57,11 +57,13 @@ class OverlapSearch {
  private:
   using Cell = std::array<std::int64_t, 3>;
 
+  /// Balls further away than integers reach share the last cell.
   Cell cell(const Vec3& x, int level) const {
+    constexpr double last = 0x1p62;
     Cell result{};
     for (int k = 0; k < domain_.dimension; ++k)
       result[k] =
-          static_cast<std::int64_t>(std::floor(std::ldexp(std::clamp(x[k] - domain_.lower[k], -1e300, 1e300), -level)));
+          static_cast<std::int64_t>(std::clamp(std::floor(std::ldexp(x[k] - domain_.lower[k], -level)), -last, last));
     return result;
   }
   static std::uint64_t key(int level, const Cell& c) {

@@ -136,6 +136,7 @@ class GrainTable {
     }
     body.velocity = spec_.velocity;
     body.angular_velocity = spec_.angular_velocity;
+    body.initial_pressure = spec_.initial_pressure;
     body.source = name_ + ":" + std::to_string(line_);
     draft_.result.bodies.push_back(std::move(body));
   }

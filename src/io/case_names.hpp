@@ -30,6 +30,7 @@ inline constexpr Named<Passes> passes_names[] = {
     {"both", Passes::both}, {"before", Passes::before}, {"after", Passes::after}};
 inline constexpr Named<FaceType> face_type_names[] = {
     {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
+inline constexpr Named<Plane> plane_names[] = {{"strain", Plane::strain}, {"stress", Plane::stress}};
 inline constexpr Named<Partition> partition_names[] = {{"metis", Partition::metis},
                                                        {"round_robin", Partition::round_robin}};
 inline constexpr Named<int> face_index_names[] = {{"left", 0}, {"right", 1}, {"bottom", 2},
@@ -40,7 +41,7 @@ inline constexpr Named<CompoundOperation> compound_names[] = {{"union", Compound
 
 /// Fields of the particle files, beside the position, which is always written.
 inline constexpr std::string_view particle_fields[] = {
-    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "plastic_strain", "image"};
+    "velocity", "spin", "stress", "body", "id", "volume", "mass", "deformation_gradient", "plastic_strain", "image"};
 inline constexpr std::size_t default_particle_fields = 6;  // the first six
 
 }  // namespace cairn::reading

@@ -177,6 +177,8 @@ void read_solver(Table solver, int dimension, SolverOptions& result) {
   result.shape = solver.choice("shape", shape_function_names, ShapeFunction::gimp);
   result.stress_update = solver.choice("stress_update", stress_update_names, StressUpdate::both);
   result.flip = solver.number("flip", 1.0, {0, 1});
+  // Points on linear hats gain energy from spin: a point's share of inertia jumps as it moves.
+  result.spin = solver.boolean("spin", result.shape != ShapeFunction::linear);
   const int most = dimension == 2 ? 64 : 125;
   result.points_per_cell = static_cast<int>(solver.integer("points_per_cell", dimension == 2 ? 4 : 8, 1, most));
   const double side =

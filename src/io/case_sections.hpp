@@ -10,6 +10,7 @@ struct GrainsSpec {
   std::filesystem::path file;  // absolute
   int material = -1;           // -1: every row names its own
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
+  double initial_pressure = 0;
   std::string group;
 };
 
@@ -29,7 +30,7 @@ void read_contact(Table contact, const std::vector<Material>& materials, Contact
 void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& faces);
 void read_parallel(Table parallel, ParallelOptions& result);
 void read_output(Table output, const Draft& draft, Output& result);
-void read_materials(Table materials, std::vector<Material>& result);
+void read_materials(Table materials, int dimension, std::vector<Material>& result);
 /// The shape a table describes; nothing after an error.
 std::optional<Shape> read_shape(Table table, int dimension, Errors& errors);
 void read_bodies(Table& root, Draft& draft, Errors& errors);
@@ -49,6 +50,8 @@ std::string material_list(const std::vector<Material>& materials);
 /// Spin in 2D is one number, in 3D a vector.
 Vec3 read_angular_velocity(Table& table, int dimension);
 
+/// Reports bodies under initial pressure that cannot have one.
+void check_pressures(const Draft& draft, Errors& errors);
 /// What is wrong with the place of a body; empty when nothing is.
 std::string placement_problem(const Shape& shape, const Domain& domain);
 /// Adds the warnings: overlapping balls, bodies thinner than two cells, bodies held by a fixed face.

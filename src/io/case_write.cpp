@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "cairn/material/registry.hpp"
 #include "case_names.hpp"
 #include "case_sections.hpp"
 
@@ -128,6 +129,7 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   out.key("shape", name_of(shape_function_names, solver.shape));
   out.key("stress_update", name_of(stress_update_names, solver.stress_update));
   out.key("flip", solver.flip);
+  out.key("spin", solver.spin);
   out.key("points_per_cell", solver.points_per_cell);
   out.key("energy_limit", solver.energy_limit);
 }
@@ -155,13 +157,28 @@ void write_contact(Writer& out, const Case& c) {
   }
 }
 
+void write_parameters(Writer& out, const Material& material) {
+  for (const auto& p : find_law(material.model)->parameters) {
+    const auto value = [&](const std::string& key) { return material.parameters.at(key); };
+    if (p.most == 0) {
+      out.key(p.key, value(std::string(p.key)));
+      continue;
+    }
+    std::vector<double> list;
+    while (material.parameters.contains(list_key(p.key, std::ssize(list))))
+      list.push_back(value(list_key(p.key, std::ssize(list))));
+    out.raw(p.key, list_of(list, std::ssize(list)));
+  }
+}
+
 void write_bodies(Writer& out, const Draft& draft) {
   const Case& c = draft.result;
   for (const auto& m : c.materials) {
     out.section("[materials." + key_of(m.name) + "]");
     out.key("model", m.model);
     out.key("density", m.density);
-    for (const auto& [name, value] : m.parameters) out.key(key_of(name), value);
+    if (c.domain.dimension == 2 && find_law(m.model)->has_plane_stress) out.key("plane", name_of(plane_names, m.plane));
+    write_parameters(out, m);
   }
   for (std::size_t i = 0; i < draft.shaped_bodies; ++i) {
     const BodySpec& body = c.bodies[i];
@@ -169,6 +186,7 @@ void write_bodies(Writer& out, const Draft& draft) {
     out.raw("shape", std::visit(ShapeWriter{c.domain.dimension}, body.shape));
     out.key("material", c.materials[body.material].name);
     out.motion(body.velocity, body.angular_velocity);
+    out.key("initial_pressure", body.initial_pressure);
     if (!body.group.empty()) out.key("group", body.group);
   }
   for (const auto& grains : draft.grains) {
@@ -176,6 +194,7 @@ void write_bodies(Writer& out, const Draft& draft) {
     out.key("file", grains.file.string());
     if (grains.material >= 0) out.key("material", c.materials[grains.material].name);
     out.motion(grains.velocity, grains.angular_velocity);
+    out.key("initial_pressure", grains.initial_pressure);
     if (!grains.group.empty()) out.key("group", grains.group);
   }
   for (const auto& drive : c.drives) {

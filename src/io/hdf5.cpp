@@ -1,6 +1,7 @@
 #include "hdf5.hpp"
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <vector>
 
@@ -46,7 +47,10 @@ bool read_number(hid_t object, const std::string& name, T& value) {
 
 }  // namespace
 
-void silence() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
+void prepare() {
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  ::setenv("HDF5_USE_FILE_LOCKING", "BEST_EFFORT", 0);  // file systems of clusters often have no locks
+}
 
 std::string error_text() {
   const int system_error = errno;

@@ -33,9 +33,9 @@ class Handle {
   herr_t (*closer_)(hid_t) = nullptr;
 };
 
-/// Stops HDF5 from printing its error stack. Call before the first use of HDF5 by a function that reports errors
-/// itself.
-void silence();
+/// Stops HDF5 from printing its error stack, and from insisting on locks. Call before the first use of HDF5 by a
+/// function that reports errors itself.
+void prepare();
 
 /// What the HDF5 call that just failed says was wrong, with the system's message if there is one. Call it before any
 /// other HDF5 function, and set errno to 0 before the call that may fail.

@@ -42,6 +42,7 @@ const std::map<std::string_view, std::string_view> units = {
     {"volume", "m3"},
     {"initial_volume", "m3"},
     {"deformation_gradient", "1"},
+    {"spin", "rad/s"},
     {"plastic_strain", "1"},
 };
 
@@ -216,7 +217,7 @@ std::string describe_header(const std::filesystem::path& file, hid_t root) {
 }  // namespace
 
 std::string describe_file(const std::filesystem::path& file) {
-  hdf5::silence();
+  hdf5::prepare();
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) throw InputError(file.string() + ": no such file");
   if (!std::filesystem::is_regular_file(file, ignored)) throw InputError(file.string() + ": not a file");

@@ -74,6 +74,7 @@ PackSpec read_pack_spec(const std::filesystem::path& file) {
     spec.fraction = pack.has("fraction") ? pack.number("fraction", std::nullopt, {0, 1, true, true}) : 0;
     spec.seed = static_cast<std::uint64_t>(pack.integer("seed", 1, 0, std::numeric_limits<std::int64_t>::max()));
     spec.max_overlap = pack.number("max_overlap", spec.max_overlap, {0, 0.1, true, true});
+    spec.effort = pack.number("effort", spec.effort, {0, 1000, true});
     if (!pack.has("count") && !pack.has("fraction")) pack.missing("count", "is missing; give count, fraction, or both");
     pack.finish();
   } else {

@@ -1,9 +1,6 @@
 #include "seal.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +10,7 @@
 
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/checksum.hpp"
+#include "posix_file.hpp"
 
 namespace cairn {
 
@@ -31,47 +29,9 @@ Seal make_seal(std::int64_t length, std::uint64_t sum) {
   return seal;
 }
 
-/// A file that is closed when it goes out of scope.
-class OpenFile {
- public:
-  OpenFile(const std::filesystem::path& file, int flags) : descriptor_(::open(file.c_str(), flags | O_CLOEXEC)) {}
-  ~OpenFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  bool valid() const { return descriptor_ >= 0; }
-  std::int64_t size() const {
-    struct stat facts = {};
-    return ::fstat(descriptor_, &facts) == 0 && S_ISREG(facts.st_mode) ? facts.st_size : -1;
-  }
-  /// Reads exactly `size` bytes; false where that fails.
-  bool read(void* to, std::int64_t size, std::int64_t at) const {
-    for (auto* bytes = static_cast<char*>(to); size > 0;) {
-      const ssize_t got = ::pread(descriptor_, bytes, static_cast<std::size_t>(size), at);
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) return false;
-      bytes += got, at += got, size -= got;
-    }
-    return true;
-  }
-  bool write(const void* from, std::int64_t size, std::int64_t at) const {
-    for (const auto* bytes = static_cast<const char*>(from); size > 0;) {
-      const ssize_t put = ::pwrite(descriptor_, bytes, static_cast<std::size_t>(size), at);
-      if (put < 0 && errno == EINTR) continue;
-      if (put <= 0) return false;
-      bytes += put, at += put, size -= put;
-    }
-    return true;
-  }
-
- private:
-  int descriptor_;
-};
-
 /// Checksum of the checksums of the file's chunks, of which each rank computes some; valid on every rank unless `error`
 /// says what went wrong on this one. Collective.
-std::uint64_t checksum_of(const OpenFile& file, std::int64_t length, MPI_Comm comm, std::string& error) {
+std::uint64_t checksum_of(const PosixFile& file, std::int64_t length, MPI_Comm comm, std::string& error) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
@@ -91,7 +51,7 @@ std::uint64_t checksum_of(const OpenFile& file, std::int64_t length, MPI_Comm co
 }
 
 /// What the end of the file shows, before its content is read.
-std::string check_end(const OpenFile& file, Seal& seal) {
+std::string check_end(const PosixFile& file, Seal& seal) {
   constexpr std::array<unsigned char, 8> hdf5_mark = {0x89, 'H', 'D', 'F', '\r', '\n', 0x1a, '\n'};
   const std::int64_t size = file.size();
   if (size < 0) return "not a file";
@@ -112,7 +72,7 @@ std::string seal(const std::filesystem::path& file, MPI_Comm comm) {
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
   errno = 0;
-  const OpenFile open(file, rank == 0 ? O_RDWR : O_RDONLY);
+  const PosixFile open(file, rank == 0 ? O_RDWR : O_RDONLY);
   std::int64_t length = open.valid() ? open.size() : -1;
   std::string error = length < 0 ? fmt::format("it cannot be read back: {}", std::strerror(errno)) : "";
   error = common_error(comm, error);
@@ -128,7 +88,7 @@ std::string seal(const std::filesystem::path& file, MPI_Comm comm) {
 
 std::string check_seal(const std::filesystem::path& file, MPI_Comm comm) {
   errno = 0;
-  const OpenFile open(file, O_RDONLY);
+  const PosixFile open(file, O_RDONLY);
   Seal seal{};
   const bool missing = !open.valid() && errno == ENOENT;
   std::string error = missing         ? "no such file"

@@ -11,6 +11,9 @@ namespace cairn {
 
 using hdf5::Handle;
 
+// Every rank opens the file by itself: nothing here communicates but the agreement on errors, so that a rank that is
+// gone, or out of memory, leaves nobody waiting inside the library.
+
 struct TableReader::State {
   std::filesystem::path file;
   MPI_Comm comm;
@@ -29,6 +32,47 @@ struct TableReader::State {
 };
 
 namespace {
+
+hsize_t size_of(std::int64_t n) { return static_cast<hsize_t>(n); }
+
+/// Columns of one component are one-dimensional.
+Handle make_space(std::int64_t rows, int components) {
+  const hsize_t extent[2] = {size_of(rows), size_of(components)};
+  return {H5Screate_simple(components == 1 ? 1 : 2, extent, nullptr), H5Sclose};
+}
+
+Handle select_blocks(std::span<const RowBlocks::Block> blocks, std::int64_t total_rows, int components) {
+  constexpr std::size_t few = 32;
+  if (blocks.size() > few) {
+    const std::size_t half = blocks.size() / 2;
+    const Handle lower = select_blocks(blocks.first(half), total_rows, components);
+    const Handle upper = select_blocks(blocks.subspan(half), total_rows, components);
+    if (!lower.valid() || !upper.valid()) return {};
+    return {H5Scombine_select(lower, H5S_SELECT_OR, upper), H5Sclose};
+  }
+  Handle space = make_space(total_rows, components);
+  if (!space.valid() || H5Sselect_none(space) < 0) return {};
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    const hsize_t start[2] = {size_of(blocks[i].file_row), 0};
+    const hsize_t count[2] = {size_of(blocks[i].count), size_of(components)};
+    if (H5Sselect_hyperslab(space, i == 0 ? H5S_SELECT_SET : H5S_SELECT_OR, start, nullptr, count, nullptr) < 0)
+      return {};
+  }
+  return space;
+}
+
+/// File rows of a rank as a selection of a dataset of `total_rows` x `components` values; empty handle on failure.
+/// The selection is built by halves: adding the blocks one by one would take time quadratic in their number.
+Handle select_rows(const RowBlocks& rows, int components) {
+  return select_blocks(merged_blocks(rows), rows.total_rows, components);
+}
+
+/// Space of `rows` x `components` values in memory, all selected.
+Handle memory_space(std::int64_t rows, int components) {
+  Handle space = make_space(rows, components);
+  if (rows == 0 && space.valid() && H5Sselect_none(space) < 0) return {};
+  return space;
+}
 
 /// Whether the dataset has `rows` x `components` values; one component means one dimension.
 std::string check_shape(hid_t dataset, const std::string& column, std::int64_t rows, int components) {
@@ -54,27 +98,23 @@ void TableReader::State::read(const std::string& column, int components, const R
 
   errno = 0;
   const Handle in_memory = memory_space(wanted.local_rows(), components), in_file = select_rows(wanted, components);
-  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose);
-  const bool ready = in_memory.valid() && in_file.valid() && H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE) >= 0;
+  const bool ready = in_memory.valid() && in_file.valid();
   throw_together(comm, ready ? "" : fmt::format("cannot read {}: {}", file.string(), hdf5::error_text()));
   // A dataset without rows has no place in the file, and HDF5 fails to read nothing from there.
   const bool good = wanted.total_rows == 0 ||
-                    H5Dread(dataset, hdf5::native_type<T>(), in_memory, in_file, transfer, values.data()) >= 0;
+                    H5Dread(dataset, hdf5::native_type<T>(), in_memory, in_file, H5P_DEFAULT, values.data()) >= 0;
   throw_together(comm,
                  good ? "" : fmt::format("cannot read {}: column {}: {}", file.string(), column, hdf5::error_text()));
 }
 
 TableReader::TableReader(const std::filesystem::path& file, MPI_Comm comm) : state_(std::make_unique<State>()) {
-  hdf5::silence();
+  hdf5::prepare();
   state_->file = file;
   state_->comm = comm;
   std::error_code ignored;
   state_->require_input(std::filesystem::is_regular_file(file, ignored) ? "" : "no such file");
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   errno = 0;
-  const bool prepared = H5Pset_fapl_mpio(access, comm, MPI_INFO_NULL) >= 0;
-  state_->require_input(prepared ? "" : hdf5::error_text());
-  state_->handle = Handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access), H5Fclose);
+  state_->handle = Handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   state_->require_input(state_->handle.valid() ? "" : "not a whole HDF5 file: " + hdf5::error_text());
   const Handle root(H5Gopen2(state_->handle, "/", H5P_DEFAULT), H5Gclose);
   const bool complete =

@@ -21,54 +21,22 @@ using hdf5::Handle;
 
 constexpr double mebibyte = 1024.0 * 1024.0;
 
-hsize_t size_of(std::int64_t n) { return static_cast<hsize_t>(n); }
-
-/// Columns of one component are one-dimensional.
-Handle make_space(std::int64_t rows, int components) {
-  const hsize_t extent[2] = {size_of(rows), size_of(components)};
-  return {H5Screate_simple(components == 1 ? 1 : 2, extent, nullptr), H5Sclose};
-}
-
-Handle select_blocks(std::span<const RowBlocks::Block> blocks, std::int64_t total_rows, int components) {
-  constexpr std::size_t few = 32;
-  if (blocks.size() > few) {
-    const std::size_t half = blocks.size() / 2;
-    const Handle lower = select_blocks(blocks.first(half), total_rows, components);
-    const Handle upper = select_blocks(blocks.subspan(half), total_rows, components);
-    if (!lower.valid() || !upper.valid()) return {};
-    return {H5Scombine_select(lower, H5S_SELECT_OR, upper), H5Sclose};
-  }
-  Handle space = make_space(total_rows, components);
-  if (!space.valid() || H5Sselect_none(space) < 0) return {};
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const hsize_t start[2] = {size_of(blocks[i].file_row), 0};
-    const hsize_t count[2] = {size_of(blocks[i].count), size_of(components)};
-    if (H5Sselect_hyperslab(space, i == 0 ? H5S_SELECT_SET : H5S_SELECT_OR, start, nullptr, count, nullptr) < 0)
-      return {};
-  }
-  return space;
-}
-
-Handle file_access(MPI_Comm comm) {
-  Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  if (H5Pset_fapl_mpio(access, comm, MPI_INFO_NULL) < 0) return {};
-  return access;
-}
-
-/// Datasets without time stamps (the same run gives the same bytes) and without fill values (every row is written).
-Handle create_dataset(hid_t file, const std::string& path, hid_t type, hid_t space) {
+/// A dataset whose values lie in one piece from the start, without time stamps (the same run gives the same bytes) and
+/// without fill values (every row is written). Columns of one component are one-dimensional.
+Handle create_dataset(hid_t file, const std::string& path, hid_t type, std::int64_t rows, int components) {
+  const hsize_t extent[2] = {static_cast<hsize_t>(rows), static_cast<hsize_t>(components)};
+  const Handle space(H5Screate_simple(components == 1 ? 1 : 2, extent, nullptr), H5Sclose);
   const Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  if (H5Pset_obj_track_times(properties, false) < 0 || H5Pset_fill_time(properties, H5D_FILL_TIME_NEVER) < 0) return {};
+  if (H5Pset_layout(properties, H5D_CONTIGUOUS) < 0 || H5Pset_alloc_time(properties, H5D_ALLOC_TIME_EARLY) < 0 ||
+      H5Pset_obj_track_times(properties, false) < 0 || H5Pset_fill_time(properties, H5D_FILL_TIME_NEVER) < 0)
+    return {};
   return {H5Dcreate2(file, path.c_str(), type, space, H5P_DEFAULT, properties, H5P_DEFAULT), H5Dclose};
 }
 
-/// Opens a path, has it flushed to disk and closes it; 0 or the system's error.
+/// Opens a path and has it flushed to disk; 0 or the system's error.
 int flush_to_disk(const std::filesystem::path& path, int flags) {
-  const int descriptor = ::open(path.c_str(), flags);
-  if (descriptor < 0) return errno;
-  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
-  ::close(descriptor);
-  return error;
+  const PosixFile open(path, flags);
+  return open.valid() && open.flush() ? 0 : errno;
 }
 
 /// Claims space for a file; 0 or the system's error. Where the file system cannot claim, it is asked what is free.
@@ -87,7 +55,7 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
 
 }  // namespace
 
-Handle select_rows(const RowBlocks& rows, int components) {
+std::vector<RowBlocks::Block> merged_blocks(const RowBlocks& rows) {
   std::vector<RowBlocks::Block> merged;
   for (const auto& block : rows.blocks) {
     if (block.count == 0) continue;
@@ -96,13 +64,7 @@ Handle select_rows(const RowBlocks& rows, int components) {
     else
       merged.push_back(block);
   }
-  return select_blocks(merged, rows.total_rows, components);
-}
-
-Handle memory_space(std::int64_t rows, int components) {
-  Handle space = make_space(rows, components);
-  if (rows == 0 && space.valid() && H5Sselect_none(space) < 0) return {};
-  return space;
+  return merged;
 }
 
 std::string check_rows(const RowBlocks& rows, int components, std::size_t size) {
@@ -140,7 +102,7 @@ std::string publish(const std::filesystem::path& temporary, const std::filesyste
 
 TableWriter::TableWriter(std::filesystem::path file, MPI_Comm comm, std::int64_t bytes)
     : file_(std::move(file)), temporary_(temporary_name(file_)), comm_(comm) {
-  hdf5::silence();
+  hdf5::prepare();
   MPI_Comm_rank(comm_, &rank_);
   try {
     create(bytes);
@@ -150,26 +112,39 @@ TableWriter::TableWriter(std::filesystem::path file, MPI_Comm comm, std::int64_t
   }
 }
 
+template <class F>
+void TableWriter::on_first_rank(const std::string& what, F&& work) {
+  std::string error;
+  errno = 0;
+  if (rank_ == 0 && !work()) error = write_failure(file_, what, hdf5::error_text());
+  throw_together(comm_, error);
+}
+
+void TableWriter::require(bool good, const std::string& what) {
+  throw_together(comm_, good ? "" : write_failure(file_, what, std::strerror(errno)));
+}
+
 void TableWriter::create(std::int64_t bytes) {
   constexpr std::int64_t metadata = 128 * 1024;
   reserve(bytes + metadata, 0);
-  errno = 0;
-  const Handle access = file_access(comm_);
-  handle_ = Handle(H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
-  require(handle_.valid(), "creating the file");
+  on_first_rank("creating the file", [&] {
+    handle_ = Handle(H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
+    return handle_.valid();
+  });
   reserve(bytes + metadata, FALLOC_FL_KEEP_SIZE);  // HDF5 has emptied the file
+  rows_ = PosixFile(temporary_, O_WRONLY);
+  require(rows_.valid(), "opening the file");
 }
 
 void TableWriter::reserve(std::int64_t bytes, int mode) {
   std::string error;
   if (rank_ == 0) {
-    const int descriptor = ::open(temporary_.c_str(), O_CREAT | O_WRONLY | O_CLOEXEC, 0666);
-    if (descriptor < 0)
+    const PosixFile file(temporary_, O_CREAT | O_WRONLY);
+    if (!file.valid())
       error = write_failure(file_, "creating the file", std::strerror(errno));
-    else if (const int reason = claim_space(descriptor, mode, bytes); reason != 0)
+    else if (const int reason = claim_space(file.descriptor(), mode, bytes); reason != 0)
       error = write_failure(file_, fmt::format("claiming {:.1f} MiB", static_cast<double>(bytes) / mebibyte),
                             std::strerror(reason));
-    if (descriptor >= 0) ::close(descriptor);
   }
   throw_together(comm_, error);
 }
@@ -179,59 +154,65 @@ TableWriter::~TableWriter() {
 }
 
 void TableWriter::discard() {
-  if (rank_ == 0 && ::truncate(temporary_.c_str(), 0) != 0) errno = 0;  // nothing better can be done here
-  MPI_Barrier(comm_);
+  if (rank_ != 0) return;
+  if (::truncate(temporary_.c_str(), 0) != 0) errno = 0;  // nothing better can be done here
   handle_.close();
-  if (rank_ == 0) ::unlink(temporary_.c_str());
-}
-
-void TableWriter::require(bool good, const std::string& what) {
-  throw_together(comm_, good ? "" : write_failure(file_, what, hdf5::error_text()));
+  ::unlink(temporary_.c_str());
 }
 
 void TableWriter::add_group(const std::string& path) {
-  errno = 0;
-  const Handle group(H5Gcreate2(handle_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
-  require(group.valid(), "creating group " + path);
+  on_first_rank("creating group " + path, [&] {
+    return Handle(H5Gcreate2(handle_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose).valid();
+  });
 }
 
 void TableWriter::add_link(const std::string& path, const std::string& target) {
-  errno = 0;
-  require(H5Lcreate_soft(target.c_str(), handle_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT) >= 0, "linking " + path);
+  on_first_rank("linking " + path,
+                [&] { return H5Lcreate_soft(target.c_str(), handle_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT) >= 0; });
 }
 
 void TableWriter::add_attribute(const std::string& object, const std::string& name, const hdf5::AttributeValue& value) {
-  errno = 0;
-  const Handle owner(H5Oopen(handle_, object.c_str(), H5P_DEFAULT), H5Oclose);
-  require(owner.valid() && hdf5::write_attribute(owner, name, value), "attribute " + name);
+  on_first_rank("attribute " + name, [&] {
+    const Handle owner(H5Oopen(handle_, object.c_str(), H5P_DEFAULT), H5Oclose);
+    return owner.valid() && hdf5::write_attribute(owner, name, value);
+  });
+}
+
+std::int64_t TableWriter::lay_out(const std::string& path, int components, std::int64_t total_rows, hid_t type) {
+  std::int64_t place = 0;
+  on_first_rank("creating dataset " + path, [&] {
+    const Handle dataset = create_dataset(handle_, path, type, total_rows, components);
+    if (!dataset.valid()) return false;
+    const haddr_t at = total_rows > 0 ? H5Dget_offset(dataset) : 0;  // a dataset without rows has no place
+    place = static_cast<std::int64_t>(at);
+    return at != HADDR_UNDEF;
+  });
+  MPI_Bcast(&place, 1, MPI_INT64_T, 0, comm_);
+  return place;
 }
 
 void TableWriter::write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type,
-                             const void* values, std::size_t size) {
+                             std::size_t value_bytes, const void* values, std::size_t size) {
   const std::string wrong = check_rows(rows, components, size);
   throw_together(comm_,
                  wrong.empty() ? "" : fmt::format("cannot write {}: dataset {}: {}", file_.string(), path, wrong));
-  errno = 0;
-  const Handle in_memory = memory_space(rows.local_rows(), components);
-  const Handle in_file = select_rows(rows, components);
-  const Handle transfer(H5Pcreate(H5P_DATASET_XFER), H5Pclose);
-  require(in_memory.valid() && in_file.valid() && H5Pset_dxpl_mpio(transfer, H5FD_MPIO_COLLECTIVE) >= 0,
-          "preparing dataset " + path);
-  Handle dataset = create_dataset(handle_, path, type, in_file);
-  require(dataset.valid(), "creating dataset " + path);
-  errno = 0;
-  // HDF5 gives a dataset without rows no place in the file, and fails to write nothing there.
-  require(rows.total_rows == 0 || H5Dwrite(dataset, type, in_memory, in_file, transfer, values) >= 0,
-          "dataset " + path);
-  errno = 0;
-  require(dataset.close(), "closing dataset " + path);
+  const std::int64_t place = lay_out(path, components, rows.total_rows, type);
+  const std::int64_t row_bytes = components * static_cast<std::int64_t>(value_bytes);
+  const auto* bytes = static_cast<const char*>(values);
+  bool good = true;
+  for (const auto& block : merged_blocks(rows)) {
+    const std::int64_t count = block.count * row_bytes;
+    good = good && rows_.write(bytes, count, place + block.file_row * row_bytes);
+    bytes += count;
+  }
+  require(good, "dataset " + path);
 }
 
 void TableWriter::finish(bool sealed) {
-  errno = 0;
-  require(H5Fflush(handle_, H5F_SCOPE_GLOBAL) >= 0, "flushing");
-  errno = 0;
-  require(handle_.close(), "closing the file");
+  const bool flushed = rows_.flush();
+  require(flushed && rows_.close(), "flushing");
+  on_first_rank("flushing", [&] { return H5Fflush(handle_, H5F_SCOPE_GLOBAL) >= 0; });
+  on_first_rank("closing the file", [&] { return handle_.close(); });
   const std::string unsealed = sealed ? seal(temporary_, comm_) : "";
   throw_together(comm_, unsealed.empty() ? "" : write_failure(file_, "sealing the file", unsealed));
   throw_together(comm_, rank_ == 0 ? publish(temporary_, file_) : "");

@@ -3,20 +3,17 @@
 
 #include "cairn/io/table_file.hpp"
 #include "hdf5.hpp"
+#include "posix_file.hpp"
 
 namespace cairn {
-
-/// File rows of a rank as a selection of a dataset of `total_rows` x `components` values; empty handle on failure.
-/// The selection is built by halves: adding the blocks one by one would take time quadratic in their number.
-hdf5::Handle select_rows(const RowBlocks& rows, int components);
-
-/// Space of `rows` x `components` values in memory, all selected.
-hdf5::Handle memory_space(std::int64_t rows, int components);
 
 /// What is wrong with this rank's blocks for a buffer of `size` values, or empty.
 std::string check_rows(const RowBlocks& rows, int components, std::size_t size);
 
-/// What the file system says about a failure to write: a full disk has no other clear sign through MPI-IO.
+/// The blocks that are not empty; those that follow each other in the file as one.
+std::vector<RowBlocks::Block> merged_blocks(const RowBlocks& rows);
+
+/// What the file system says about a failure to write, and what is free there.
 std::string write_failure(const std::filesystem::path& file, const std::string& what, const std::string& reason);
 
 /// Flushes a file to disk and gives it its final name, replacing what was there; returns the error, empty if none.
@@ -26,7 +23,11 @@ std::string publish(const std::filesystem::path& temporary, const std::filesyste
 std::filesystem::path temporary_name(const std::filesystem::path& file);
 
 /// Every member function is collective, and throws the same RunError on every rank if it fails on any. Destroyed before
-/// finish(), the writer removes what it wrote.
+/// finish(), the writer removes what it wrote, without communication.
+///
+/// Rank 0 alone has the file open in HDF5 and lays out its datasets there; each rank then writes its rows to their
+/// place by the system's own calls. Ranks agree on errors after each of these steps, so that an error on one of them
+/// keeps no other waiting, as it would inside a collective write.
 ///
 /// HDF5 (1.10) cannot close a file whose writing failed: the library then crashes or loops when the program ends. So
 /// the space is claimed from the file system before HDF5 writes anything, which finds a full disk, quota or limit
@@ -47,16 +48,21 @@ class TableWriter {
   /// Writes a dataset of rows.total_rows (x components) values, each rank its own rows.
   template <class T>
   void write(const std::string& path, int components, const RowBlocks& rows, std::span<const T> values) {
-    write_rows(path, components, rows, hdf5::native_type<T>(), values.data(), values.size());
+    write_rows(path, components, rows, hdf5::native_type<T>(), sizeof(T), values.data(), values.size());
   }
 
   /// Flushes to disk and renames; `sealed` (seal.hpp): with a checksum of the whole file at its end.
   void finish(bool sealed = false);
 
  private:
-  void write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type, const void* values,
-                  std::size_t size);
-  /// Throws on every rank if `good` is false on any; call it straight after the HDF5 call, with errno 0 before that.
+  void write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type, std::size_t value_bytes,
+                  const void* values, std::size_t size);
+  /// Makes a dataset and says where in the file its values lie.
+  std::int64_t lay_out(const std::string& path, int components, std::int64_t total_rows, hid_t type);
+  /// Has rank 0 do what returns whether it went well; throws on every rank where it did not.
+  template <class F>
+  void on_first_rank(const std::string& what, F&& work);
+  /// Throws on every rank if `good` is false on any, with the system's last error.
   void require(bool good, const std::string& what);
   void create(std::int64_t bytes);
   /// Closes and removes the unfinished file.
@@ -68,7 +74,8 @@ class TableWriter {
   MPI_Comm comm_;
   int rank_ = 0;
   bool finished_ = false;
-  hdf5::Handle handle_;
+  hdf5::Handle handle_;  // on rank 0
+  PosixFile rows_;       // where this rank writes its rows
 };
 
 }  // namespace cairn

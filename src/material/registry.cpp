@@ -1,6 +1,7 @@
 #include "cairn/material/registry.hpp"
 
-#include <array>
+#include <algorithm>
+#include <vector>
 
 #include "cairn/core/error.hpp"
 
@@ -11,19 +12,53 @@ template <class Variant>
 struct Table;
 template <class... Laws>
 struct Table<std::variant<Laws...>> {
-  inline static const std::array<LawInfo, sizeof...(Laws)> infos = {LawInfo{Laws::name, Laws::parameters}...};
-  static Law make(std::string_view model, const ParameterValues& values) {
+  /// Types that share a name differ in their number of state variables alone, and count once.
+  static std::vector<LawInfo> infos() {
+    std::vector<LawInfo> all = {{Laws::name, Laws::parameters, HasPlaneStress<Laws>, HasPressure<Laws>}...};
+    const auto rest = std::ranges::unique(all, {}, &LawInfo::name);
+    all.erase(rest.begin(), rest.end());
+    return all;
+  }
+
+  template <class ConcreteLaw>
+  static bool fits(const ParameterValues& values) {
+    if constexpr (requires { ConcreteLaw::fits(values); })
+      return ConcreteLaw::fits(values);
+    else
+      return true;
+  }
+
+  static std::optional<Law> make(std::string_view model, const ParameterValues& values) {
     std::optional<Law> law;
-    ((Laws::name == model ? void(law.emplace(Laws(values))) : void()), ...);
-    if (!law) throw InputError("unknown material model '" + std::string(model) + "'");
-    return *law;
+    ((Laws::name == model && fits<Laws>(values) ? void(law.emplace(Laws(values))) : void()), ...);
+    return law;
   }
 };
 
 }  // namespace
 
-std::span<const LawInfo> law_infos() { return Table<Law>::infos; }
+std::span<const LawInfo> law_infos() {
+  static const std::vector<LawInfo> infos = Table<Law>::infos();
+  return infos;
+}
 
-Law make_law(std::string_view model, const ParameterValues& parameters) { return Table<Law>::make(model, parameters); }
+const LawInfo* find_law(std::string_view model) {
+  const auto found = std::ranges::find(law_infos(), model, &LawInfo::name);
+  return found == law_infos().end() ? nullptr : &*found;
+}
+
+Law make_law(std::string_view model, const ParameterValues& parameters, Plane plane) {
+  std::optional<Law> law = Table<Law>::make(model, parameters);
+  if (!law) {
+    if (!find_law(model)) throw InputError("unknown material model '" + std::string(model) + "'");
+    throw InputError("the parameters do not fit the material model '" + std::string(model) + "'");
+  }
+  std::visit(
+      [&](auto& concrete) {
+        if constexpr (requires { concrete.plane; }) concrete.plane = plane;
+      },
+      *law);
+  return *law;
+}
 
 }  // namespace cairn

@@ -1,6 +1,7 @@
 #include "cairn/parallel/communicator.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <limits>
 
 #include "cairn/core/error.hpp"
@@ -18,6 +19,16 @@ NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours)
       outgoing_(neighbours_.size() + 1),
       incoming_(neighbours_.size()) {
   MPI_Comm_rank(comm_, &rank_);
+}
+
+NeighbourExchange::~NeighbourExchange() {
+  // On the way out of an error of this rank alone nobody may be there to receive what was sent.
+  int sent = 1;
+  MPI_Testall(static_cast<int>(requests_.size()), requests_.data(), &sent, MPI_STATUSES_IGNORE);
+  if (!sent && std::uncaught_exceptions() > 0)
+    new std::vector<Message>(std::move(outgoing_));  // kept for MPI to the end
+  else
+    wait();
 }
 
 std::size_t NeighbourExchange::slot(int rank) const {

@@ -46,9 +46,10 @@ Shares shares_of(const Simulation<Dim>& simulation) {
   return shares;
 }
 
-/// Moments of a piece about its body's first centre: mass, m r, m v, m r x v, m r r^T (6), V sigma (6), V.
+/// Moments of a piece about its body's first centre: mass, m r, m v, m r x v, m r r^T (6), V sigma (6), V, and the
+/// inertia of the points' own spin (3).
 struct Moments {
-  static constexpr int size = 23;
+  static constexpr int size = 26;
   std::array<double, size> m{};
 };
 
@@ -58,6 +59,7 @@ Moments moments_of(const Simulation<Dim>& simulation, const Piece<Dim>& piece) {
   const double density = simulation.material_of(piece).density;
   const Vec3& origin = simulation.bodies()[piece.body].centre;
   const Points<Dim>& points = piece.points;
+  const auto inertia = spin_inertia(piece, simulation.lattice(), simulation.transfer());
   Moments sums;
   for (int p = 0; p < points.size(); ++p) {
     Vec3 r = Vec3::Zero(), v = Vec3::Zero();
@@ -78,6 +80,11 @@ Moments moments_of(const Simulation<Dim>& simulation, const Piece<Dim>& piece) {
     }
     for (int i = 0; i < symmetric_size<Dim>; ++i) m[16 + i] += volume * points.column(C::stress + i)[p];
     m[22] += volume;
+    for (int s = 0; s < spin_size<Dim>; ++s) {
+      const int axis = Dim == 2 ? 2 : s;
+      m[7 + axis] += mass * inertia[p][s] * points.column(C::spin + s)[p];
+      m[23 + axis] += mass * inertia[p][s];
+    }
   }
   return sums;
 }
@@ -92,7 +99,9 @@ BodyState state_of(int body, const std::array<double, Moments::size>& m, const V
   Mat3 second;  // central second moments
   second << m[10], m[13], m[15], m[13], m[11], m[14], m[15], m[14], m[12];
   second -= m[0] * offset * offset.transpose();
-  const Mat3 inertia = second.trace() * Mat3::Identity() - second;
+  Mat3 inertia = second.trace() * Mat3::Identity() - second;
+  for (int i = 0; i < 3; ++i) inertia(i, i) += m[23 + i];
+  s.angular_momentum = spin;
   if (dimension == 2)
     s.angular_velocity[2] = inertia(2, 2) > 0 ? spin[2] / inertia(2, 2) : 0.0;
   else

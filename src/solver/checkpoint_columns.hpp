@@ -23,6 +23,7 @@ std::vector<Quantity> quantities(int states) {
   using C = PointColumns<Dim>;
   std::vector<Quantity> list = {{"position", C::position, Dim},
                                 {"velocity", C::velocity, Dim},
+                                {"spin", C::spin, spin_size<Dim>},
                                 {"deformation_gradient", C::deformation, tensor_size<Dim>},
                                 {"stress", C::stress, symmetric_size<Dim>},
                                 {"initial_volume", C::volume, 1}};

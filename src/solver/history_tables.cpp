@@ -20,13 +20,13 @@ std::vector<std::string> history_columns(int dimension) {
                                     "momentum_x",
                                     "momentum_y"};
   if (dimension == 3) names.emplace_back("momentum_z");
-  names.insert(names.end(), {"contact_nodes", "mass"});
+  names.insert(names.end(), {"contact_nodes", "mass", "viscous_dissipation"});
   return names;
 }
 
 std::vector<std::string> body_columns(int dimension) {
-  if (dimension == 2) return {"step", "time", "body", "x", "y", "vx", "vy", "wz"};
-  return {"step", "time", "body", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"};
+  if (dimension == 2) return {"step", "time", "body", "x", "y", "vx", "vy", "wx", "wy", "wz", "lx", "ly", "lz"};
+  return {"step", "time", "body", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "lx", "ly", "lz"};
 }
 
 template <int Dim>
@@ -56,6 +56,7 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   for (int d = 0; d < Dim; ++d) row.emplace_back(t.momentum[d]);
   row.emplace_back(static_cast<std::int64_t>(t.contact_nodes));
   row.emplace_back(t.mass);
+  row.emplace_back(t.viscous);
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }
@@ -63,7 +64,7 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
 template <int Dim>
 void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
   // Tracked bodies are few: each rank sends those it answers for to rank 0.
-  constexpr int width = 10;
+  constexpr int width = 13;
   const MPI_Comm comm = simulation.communicator();
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
@@ -72,7 +73,8 @@ void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
   for (const BodyState& s : body_states(simulation))
     if (std::find(track_.begin(), track_.end(), s.body) != track_.end()) {
       mine.push_back(s.body);
-      for (const Vec3& v : {s.centre, s.velocity, s.angular_velocity}) mine.insert(mine.end(), v.data(), v.data() + 3);
+      for (const Vec3& v : {s.centre, s.velocity, s.angular_velocity, s.angular_momentum})
+        mine.insert(mine.end(), v.data(), v.data() + 3);
     }
   std::vector<int> counts(ranks), starts(ranks, 0);
   const int count = static_cast<int>(mine.size());
@@ -82,9 +84,9 @@ void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
   MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm);
   for (std::size_t i = 0; i < all.size(); i += width) {
     std::vector<CsvValue> row = {simulation.steps(), simulation.time(), static_cast<std::int64_t>(all[i])};
-    for (int group = 0; group < 3; ++group)
+    for (int group = 0; group < 4; ++group)
       for (int d = 0; d < 3; ++d)
-        if (Dim == 3 || (group == 2) == (d == 2)) row.emplace_back(all[i + 1 + 3 * group + d]);
+        if (d < Dim || group >= 2) row.emplace_back(all[i + 1 + 3 * group + d]);
     bodies_.add_row(row);
   }
 }

@@ -1,37 +1,17 @@
 #include "memory.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
-#include <algorithm>
-#include <fstream>
-#include <limits>
 #include <string>
 
 #include "cairn/body/piece.hpp"
 #include "cairn/core/error.hpp"
+#include "cairn/core/memory.hpp"
 #include "cairn/io/agreement.hpp"
 
 namespace cairn {
 
 namespace {
-
-/// What the system can give without swapping [bytes]; infinite where it does not say.
-double available_memory() {
-  double kibibytes = 0;
-  std::ifstream facts("/proc/meminfo");
-  for (std::string key; facts >> key; facts.ignore(std::numeric_limits<std::streamsize>::max(), '\n'))
-    if (key == "MemAvailable:" && facts >> kibibytes) return 1024 * kibibytes;
-  return std::numeric_limits<double>::infinity();
-}
-
-/// What the limit of this process (ulimit -v) leaves [bytes].
-double process_limit() {
-  rlimit limit{};
-  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY)
-    return std::numeric_limits<double>::infinity();
-  return static_cast<double>(limit.rlim_cur);
-}
 
 std::string shortage(double needed, double available, const std::string& who, const std::string& where) {
   if (needed <= available) return {};
@@ -71,7 +51,7 @@ void require_memory(double bytes, MPI_Comm comm) {
       shortage(all, available_memory(),
                fmt::format("the {} rank{} of this machine need{}", ranks, ranks == 1 ? "" : "s", ranks == 1 ? "s" : ""),
                "it has free");
-  if (problem.empty()) problem = shortage(bytes, process_limit(), "a rank needs", "its limit (ulimit -v) is");
+  if (problem.empty()) problem = shortage(bytes, memory_limit(), "a rank needs", "its limit (ulimit -v, -m) is");
   problem = common_error(comm, problem);
   if (!problem.empty()) throw InputError(problem);
 }

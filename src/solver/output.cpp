@@ -85,6 +85,10 @@ class PointTable {
     else if (field == "velocity")
       add_columns(field, 3,
                   [](auto& points, int p, int c) { return c < Dim ? points.column(C::velocity + c)[p] : 0.0; });
+    else if (field == "spin")
+      add_columns(field, 3, [](auto& points, int p, int c) {
+        return Dim == 3 ? points.column(C::spin + c % spin_size<Dim>)[p] : c == 2 ? points.column(C::spin)[p] : 0.0;
+      });
     else if (field == "stress")
       add_columns(field, 6, [](auto& points, int p, int c) {
         return c < symmetric_size<Dim> ? points.column(C::stress + c)[p] : 0.0;

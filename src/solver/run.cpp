@@ -213,7 +213,8 @@ class Run {
     particles_.restore(state.particles), grains_.restore(state.grains), contacts_.restore(state.contacts);
     history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
     book_.restore(state.energy);
-    contacts_cleared_ = state.contacts_kept ? state.contacts_cleared : simulation_.time();
+    // Contacts that this run is the first to keep are summed from now on.
+    contacts_cleared_ = contacts_kept() && !state.contacts_kept ? simulation_.time() : state.contacts_cleared;
     if (!contacts_kept()) simulation_.clear_contacts();
     steps_before_ = simulation_.steps();
     fraction_before_ = fraction();

@@ -26,13 +26,13 @@ Lattice<Dim> make_lattice(const Domain& domain) {
 }
 
 SolverMaterial make_material(const Material& spec) {
-  SolverMaterial m{spec.name, make_law(spec.model, spec.parameters), spec.density, false, 0.0, {}};
+  SolverMaterial m{spec.name, make_law(spec.model, spec.parameters, spec.plane), spec.density, false, 0.0, {}};
   std::visit(
       [&](const auto& law) {
         m.rigid = law.rigid;
         m.state_names.assign(law.state_names.begin(), law.state_names.end());
         Symmetric<3, double> stress{};
-        double state[8] = {};
+        double state[state_capacity] = {};
         m.longitudinal_modulus =
             law.update(Tensor<3, double>{}, Tensor<3, double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, 1.0, stress, state);
       },
@@ -72,6 +72,21 @@ FaceConditions<Dim> make_faces(const Case& c) {
   }
   return faces;
 }
+
+/// State of a body under hydrostatic pressure [Pa]; without it, the reference state.
+struct InitialState {
+  double volume_ratio = 1;  // det F
+  std::array<double, state_capacity> state{};
+
+  InitialState(const Law& law, double pressure) {
+    std::visit(
+        [&](const auto& concrete) {
+          if constexpr (HasPressure<std::remove_cvref_t<decltype(concrete)>>)
+            if (pressure != 0) volume_ratio = concrete.pressurise(pressure, state.data());
+        },
+        law);
+  }
+};
 
 /// Fills patches with the points of bodies: a square lattice of points in every cell, those inside the body's shape.
 template <int Dim>
@@ -119,14 +134,21 @@ class Filler {
       const Vec3 omega = body.rigid ? body.angular_velocity : spec.angular_velocity;
       const Vec3 v = (body.rigid ? body.velocity : spec.velocity) + omega.cross(x - shift - body.centre);
       for (int c = 0; c < points.columns(); ++c) points.column(c)[p] = 0;
-      for (int i = 0; i < 3; ++i) points.column(C::deformation + tensor_index<Dim>(i, i))[p] = 1;
+      const double pressure = body.rigid ? 0.0 : spec.initial_pressure;
+      const InitialState initial(materials_[body.material].law, pressure);
+      for (int i = 0; i < 3; ++i) {
+        points.column(C::deformation + tensor_index<Dim>(i, i))[p] = std::cbrt(initial.volume_ratio);
+        points.column(C::stress + i)[p] = -pressure;
+      }
+      for (int c = C::state; c < points.columns(); ++c) points.column(c)[p] = initial.state[c - C::state];
+      for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = omega[Dim == 2 ? 2 : s];
       Image image{};
       for (int d = 0; d < Dim; ++d) {
         points.column(d)[p] = x[d];
         points.column(C::velocity + d)[p] = v[d];
         image[d] = static_cast<std::int16_t>(-std::lround(shift[d] / lattice_.length(d)));
       }
-      points.column(C::volume)[p] = volume;
+      points.column(C::volume)[p] = volume / initial.volume_ratio;
       points.ids()[p] = first_id++;
       points.images()[p] = image;
     });

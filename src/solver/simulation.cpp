@@ -7,6 +7,7 @@
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/parallel/balance.hpp"
+#include "fault.hpp"
 
 namespace cairn {
 namespace {
@@ -101,6 +102,7 @@ void Simulation<Dim>::strain_first(double share) {
       }
     });
   }
+  look_for_fault(3);
   const auto time = timers_.measure(Stage::exchange);
   exchange_->sum(patches_, &NodeBox<Dim>::force);
   for (auto& patch : patches_) mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::force);
@@ -149,6 +151,7 @@ void Simulation<Dim>::project_again() {
   });
   for_pieces([&](Piece<Dim>& piece) { velocity_from_momentum(piece); });
   for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_, true);
+  for_pieces([&](Piece<Dim>& piece) { centre_motion(piece); });
 }
 
 template <int Dim>
@@ -160,6 +163,7 @@ void Simulation<Dim>::strain_last(double share) {
     if (!is_rigid(piece))
       update_stress(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
   });
+  look_for_fault(2);
 }
 
 template <int Dim>
@@ -171,6 +175,7 @@ void Simulation<Dim>::move_points() {
     else
       move(piece, lattice_, transfer_, dt_, speeds_);
   });
+  look_for_fault(1);
 }
 
 /// Points of a rigid body turn about its centre, which moves with the body's velocity.
@@ -207,10 +212,21 @@ void Simulation<Dim>::migrate_points() {
       for (auto& piece : patch.pieces) sort_by_cell(piece, lattice_, patch.cells);
 }
 
+/// Notes which point a stage found to be inverted or not finite. What it did to others in later stages does not matter:
+/// the most urgent fault of all ranks is the one reported, that of the earliest stage.
+template <int Dim>
+void Simulation<Dim>::look_for_fault(int urgency) {
+  if (fault_urgency_ > 0 || (std::isfinite(speeds_.wave) && std::isfinite(speeds_.point))) return;
+  const Fault fault = find_fault(patches_, bodies_);
+  fault_urgency_ = 10 * urgency + fault.kind;
+  fault_ = fault.text;
+}
+
 template <int Dim>
 void Simulation<Dim>::start_speed_reduction() {
   speed_message_[0] = speeds_.wave, speed_message_[1] = speeds_.point;
-  speed_message_[2] = migration_->failure().empty() ? 0 : 1;
+  if (fault_urgency_ == 0 && !migration_->failure().empty()) fault_urgency_ = 1, fault_ = migration_->failure();
+  speed_message_[2] = fault_urgency_;
   const Notice notice = ask_ ? ask_() : Notice{};
   speed_message_[3] = notice.stop, speed_message_[4] = notice.wall;
   MPI_Iallreduce(speed_message_, speed_result_, speed_size, MPI_DOUBLE, MPI_MAX, comm_, &speed_request_);
@@ -228,7 +244,8 @@ void Simulation<Dim>::finish_speed_reduction() {
   if (speed_request_ == MPI_REQUEST_NULL) return;  // done already
   MPI_Wait(&speed_request_, MPI_STATUS_IGNORE);
   if (speed_result_[2] > 0)
-    throw RunError(fmt::format("step {}: {}", steps_, common_error(comm_, migration_->failure())));
+    throw RunError(fmt::format("step {}: {}", steps_,
+                               common_error(comm_, fault_urgency_ == speed_result_[2] ? fault_ : std::string())));
 }
 
 template <int Dim>

@@ -5,9 +5,9 @@
 namespace cairn {
 namespace {
 
-constexpr int sum_count = 11;
-using Sums =
-    std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass, nodes
+constexpr int sum_count = 12;
+using Sums = std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass,
+                                             // nodes, viscous
 
 /// One point's deformation gradient.
 template <int Dim>
@@ -22,9 +22,10 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, const
   using C = PointColumns<Dim>;
   const SolverMaterial& material = simulation.material_of(piece);
   const Points<Dim>& points = piece.points;
+  const auto inertia = spin_inertia(piece, simulation.lattice(), simulation.transfer());
   std::visit(
       [&](const auto& law) {
-        std::array<double, 8> state{};
+        std::array<double, state_capacity> state{};
         for (int p = 0; p < points.size(); ++p) {
           const double volume = points.column(C::volume)[p], mass = material.density * volume;
           sums[9] += mass;
@@ -37,10 +38,13 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, const
             height += gravity[d] * (points.column(d)[p] + points.images()[p][d] * simulation.lattice().length(d));
             sums[6 + d] += mass * v;
           }
+          for (int s = 0; s < spin_size<Dim>; ++s) squared += inertia[p][s] * std::pow(points.column(C::spin + s)[p], 2);
           sums[0] += 0.5 * mass * squared;
           sums[1] += volume * law.strain_energy(deformation_of(points, p), state.data());
           sums[2] -= mass * height;
           sums[3] += volume * law.plastic_work(state.data());
+          if constexpr (requires { law.viscous_dissipation(state.data()); })
+            sums[11] += volume * law.viscous_dissipation(state.data());
         }
       },
       material.law);
@@ -75,7 +79,7 @@ Totals Simulation<Dim>::totals() const {
   t.kinetic = sums[0], t.strain = sums[1], t.potential = sums[2], t.plastic = sums[3];
   t.contact_dissipation = sums[4], t.boundary_work = sums[5];
   t.momentum = Vec3(sums[6], sums[7], sums[8]);
-  t.mass = sums[9], t.contact_nodes = sums[10];
+  t.mass = sums[9], t.contact_nodes = sums[10], t.viscous = sums[11];
   return t;
 }
 

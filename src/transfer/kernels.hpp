@@ -3,6 +3,7 @@
 /// Nodes are visited point by point, and a node's quantities lie side by side: one vector operation serves them all.
 
 #include <algorithm>
+#include <limits>
 
 #include "cairn/grid/shape_functions.hpp"
 #include "cairn/transfer/transfer.hpp"
@@ -22,6 +23,14 @@ void with_shape(const TransferSettings<Dim>& settings, F&& f) {
   }
 }
 
+/// As with_shape, for what moves points or their momentum: the shape is `Spinning` where points carry spin.
+template <int Dim, class F>
+void with_moving_shape(const TransferSettings<Dim>& settings, F&& f) {
+  with_shape(settings, [&]<class Shape>(const Shape& shape) {
+    settings.spin ? f(Spinning<Shape>{shape}) : f(shape);
+  });
+}
+
 /// Calls f(shape) with the weights of the normals, where they are not those of the shape function.
 template <int Dim, class F>
 void with_normal_shape(const TransferSettings<Dim>& settings, F&& f) {
@@ -38,6 +47,35 @@ void for_chunks(const Points<Dim>& points, const Lattice<Dim>& lattice, const Bo
     for (int d = 0; d < Dim; ++d) x[d] = points.column(d) + first;
     const Stencil<Dim, Shape> stencil(lattice, shape, box, x);
     f(first, std::min(lane_count, points.size() - first), stencil);
+  }
+}
+
+/// Calls f(s, i, j) for every component s of a spin, which turns direction i towards j.
+template <int Dim, class F>
+void for_spins(F&& f) {
+  for (int s = 0; s < spin_size<Dim>; ++s) Dim == 2 ? f(s, 0, 1) : f(s, (s + 1) % 3, (s + 2) % 3);
+}
+
+/// Calls add(node, row, gradient) for every node of point p with what it gives to the node's row: N times `value`,
+/// where the momentum m (v + w x arm) takes the columns from `momentum` on.
+template <int momentum, class Row, int Dim, class Shape, class F>
+void scatter_row(const Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane, double mass, Row value,
+                 F&& add) {
+  using C = PointColumns<Dim>;
+  for (int d = 0; d < Dim; ++d) value[momentum + d] = mass * points.column(C::velocity + d)[p];
+  if constexpr (Stencil<Dim, Shape>::spinning) {
+    Row turn[Dim] = {};  // for each direction of the arm
+    for_spins<Dim>([&](int s, int i, int j) {
+      const double w = mass * points.column(C::spin + s)[p];
+      turn[i][momentum + j] += w, turn[j][momentum + i] -= w;
+    });
+    stencil.for_nodes(lane, [&](int node, double w, const double(&g)[Dim], const double(&arm)[Dim]) {
+      Row sum = value;
+      for (int d = Dim - 1; d >= 0; --d) sum += turn[d] * arm[d];
+      add(node, sum * w, g);
+    });
+  } else {
+    stencil.for_nodes(lane, [&](int node, double w, const double(&g)[Dim]) { add(node, value * w, g); });
   }
 }
 
@@ -68,29 +106,38 @@ Tensor<Dim, Lanes> gather_strain(const Stencil<Dim, Shape>& stencil, int count, 
   return A;
 }
 
+/// The squared wave speeds a; infinite where a point is inverted, or its J or stress is not finite.
+template <int Dim>
+Lanes guarded(Lanes a, Lanes J, const Symmetric<Dim, Lanes>& stress) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Lanes zero = 0.0 * a;  // stays 0 unless something is not finite
+  for (int i = 0; i < symmetric_size<Dim>; ++i) zero += 0.0 * stress.c[i];
+  return select((J > 0.0) & (J < infinity) & (zero == 0.0), a, infinity);
+}
+
 /// Largest of the first `count` lanes and `so_far`.
 inline double largest(Lanes a, int count, double so_far) {
   for (int lane = 0; lane < count; ++lane) so_far = std::max(so_far, a[lane]);
   return so_far;
 }
 
-/// Deformation gradient, stress and state of eight points from A = dt L; returns the largest squared wave speed.
+/// Deformation gradient, stress and state of eight points from A = dt L; returns the largest squared wave speed,
+/// infinite where one of them is `guarded`.
 template <int Dim, class ConcreteLaw>
 double apply_law(Points<Dim>& points, int first, int count, const ConcreteLaw& law, const Tensor<Dim, Lanes>& A,
                  double inverse_density, double so_far) {
   using C = PointColumns<Dim>;
   constexpr int states = static_cast<int>(ConcreteLaw::state_names.size());
-  const Tensor<Dim, Lanes> F = advance_deformation(A, load_deformation(points, first));
-  const Lanes J = determinant(F);
+  Tensor<Dim, Lanes> F = load_deformation(points, first);
   Symmetric<Dim, Lanes> stress;
   Lanes state[states + 1];
   for (int i = 0; i < symmetric_size<Dim>; ++i) stress.c[i] = load(points.column(C::stress + i) + first);
   for (int i = 0; i < states; ++i) state[i] = load(points.column(C::state + i) + first);
-  const Lanes modulus = law.update(A, F, J, stress, state);
+  const Lanes modulus = advance_point(law, A, F, stress, state);
   for (int i = 0; i < tensor_size<Dim>; ++i) store(points.column(C::deformation + i) + first, F.c[i]);
   for (int i = 0; i < symmetric_size<Dim>; ++i) store(points.column(C::stress + i) + first, stress.c[i]);
   for (int i = 0; i < states; ++i) store(points.column(C::state + i) + first, state[i]);
-  return largest(modulus * inverse_density, count, so_far);
+  return largest(guarded(modulus * inverse_density, determinant(F), stress), count, so_far);
 }
 
 /// Force of eight points on the nodes: -V sigma . grad N + m g N, V = V0 det F the current volume.

@@ -17,15 +17,15 @@ void scatter_sums(const Points<Dim>& points, int first, int count, const Stencil
     const double mass = density * points.column(C::volume)[first + lane];
     Lanes value{}, slope[Dim] = {};
     value[N::mass] = mass;
-    for (int d = 0; d < Dim; ++d) value[N::momentum + d] = mass * points.column(C::velocity + d)[first + lane];
     value[N::volume] = current[lane];
     for (int d = 0; d < Dim; ++d) slope[d][N::gradient + d] = by_mass ? mass : current[lane];
-    stencil.for_nodes(lane, [&](int node, double w, const double(&g)[Dim]) {
-      double* at = sums + node * N::width;
-      Lanes sum = load(at) + value * w;
-      for (int d = 0; d < Dim; ++d) sum += slope[d] * g[d];
-      store(at, sum);
-    });
+    scatter_row<N::momentum>(points, first + lane, stencil, lane, mass, value,
+                             [&](int node, Lanes row, const double(&g)[Dim]) {
+                               double* at = sums + node * N::width;
+                               Lanes sum = load(at) + row;
+                               for (int d = 0; d < Dim; ++d) sum += slope[d] * g[d];
+                               store(at, sum);
+                             });
   }
 }
 
@@ -118,6 +118,7 @@ TransferSettings<Dim> TransferSettings<Dim>::make(const SolverOptions& solver, c
   s.half_size.fill(0.5 / per_direction);
   s.gravity = gravity;
   s.flip = solver.flip;
+  s.spin = solver.spin;
   s.normals.by_mass = contact.normals != NormalSource::volume_gradient;
   if (contact.normals == NormalSource::density) s.normals.weights = NormalSettings::Weights::cell_density;
   // Gradients of linear hats tilt (a block on a plane loses 5 %): volume gradients take GIMP's weights instead.
@@ -141,7 +142,7 @@ void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSetti
   nodes.sums.assign(nodes.box.size() * NodeSums<Dim>::width, 0.0);
   nodes.force.assign(nodes.box.size() * vector_width, 0.0);
   const bool own_weights = settings.normals.weights == NormalSettings::Weights::of_shape;
-  with_shape(settings, [&](const auto& shape) {
+  with_moving_shape(settings, [&](const auto& shape) {
     for_chunks(piece.points, lattice, nodes.box, shape, [&](int first, int count, const auto& stencil) {
       scatter_sums(piece.points, first, count, stencil, density, settings.normals.by_mass, nodes.sums.data());
       const PointForce<Dim> force(piece.points, first, density, settings.gravity);

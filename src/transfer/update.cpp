@@ -5,34 +5,57 @@ namespace {
 
 using namespace kernels;
 
-/// sum N (acceleration, velocity) for one point.
-template <int Dim, class Shape>
-auto gather_motion(const Stencil<Dim, Shape>& stencil, int lane, const double* motion) {
-  using M = NodeMotion<Dim>;
-  if constexpr (Dim == 2) {
-    Lanes4 sum{};
-    stencil.for_nodes(lane,
-                      [&](int node, double w, const double(&)[Dim]) { sum += load4(motion + node * M::width) * w; });
-    return sum;
-  } else {
-    Lanes sum{};
-    stencil.for_nodes(lane,
-                      [&](int node, double w, const double(&)[Dim]) { sum += load(motion + node * M::width) * w; });
-    return sum;
-  }
+/// A node's motion, one row.
+template <int Dim>
+using MotionRow = std::conditional_t<Dim == 2, Lanes4, Lanes>;
+
+template <int Dim>
+MotionRow<Dim> load_motion(const double* motion, int node) {
+  if constexpr (Dim == 2) return load4(motion + node * NodeMotion<Dim>::width);
+  if constexpr (Dim == 3) return load(motion + node * NodeMotion<Dim>::width);
 }
 
-/// v_p += dt sum N a, blended with sum N v.
+/// w_p += dt sum N arm x a / sum N arm^2, the transpose of how spin gives momentum to the nodes: energy and angular
+/// momentum go to the points as the nodes have them. `moment[d]` is sum N arm_d (acceleration, velocity); of the rest, 1 - `keep`,
+/// it takes the grid's spin.
+template <int Dim, class Shape>
+void turn_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
+                const MotionRow<Dim> (&moment)[Dim], double dt, double keep) {
+  using M = NodeMotion<Dim>;
+  for_spins<Dim>([&](int s, int i, int j) {
+    const double inertia = stencil.spread[i][lane] + stencil.spread[j][lane];
+    if (!(inertia > 0)) return;  // on a node of linear shapes: it gives no momentum either
+    const auto curl = [&](int first) { return (moment[i][first + j] - moment[j][first + i]) / inertia; };
+    double& w = points.column(PointColumns<Dim>::spin + s)[p];
+    w = keep * (w + dt * curl(M::acceleration)) + (1.0 - keep) * curl(M::velocity);
+  });
+}
+
+/// v_p += dt sum N a, blended with sum N v; and spin.
 template <int Dim, class Shape>
 void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double dt,
-                     double flip) {
+                     const TransferSettings<Dim>& settings) {
   using M = NodeMotion<Dim>;
+  const double* motion = piece.nodes.motion.data();
   for (int lane = 0; lane < count; ++lane) {
-    const auto sum = gather_motion(stencil, lane, piece.nodes.motion.data());
+    MotionRow<Dim> sum{};
+    if constexpr (Stencil<Dim, Shape>::spinning) {
+      MotionRow<Dim> moment[Dim] = {};
+      stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim], const double(&arm)[Dim]) {
+        const auto row = load_motion<Dim>(motion, node) * w;
+        sum += row;
+        for (int d = 0; d < Dim; ++d) moment[d] += row * arm[d];
+      });
+      turn_point(piece.points, first + lane, stencil, lane, moment, dt,
+                 settings.flip * (1.0 - settings.spin_relaxation));
+    } else {
+      stencil.for_nodes(
+          lane, [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
+    }
     for (int d = 0; d < Dim; ++d) {
       double& v = piece.points.column(PointColumns<Dim>::velocity + d)[first + lane];
       v += dt * sum[M::acceleration + d];
-      if (flip != 1.0) v = flip * v + (1.0 - flip) * sum[M::velocity + d];
+      if (settings.flip != 1.0) v = settings.flip * v + (1.0 - settings.flip) * sum[M::velocity + d];
     }
   }
 }
@@ -40,15 +63,13 @@ void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim,
 template <int Dim, class Shape>
 void scatter_momentum(const Points<Dim>& points, int first, int count, const Stencil<Dim, Shape>& stencil,
                       double density, double* momentum) {
-  using C = PointColumns<Dim>;
   for (int lane = 0; lane < count; ++lane) {
-    Lanes4 p{};
-    const double mass = density * points.column(C::volume)[first + lane];
-    for (int d = 0; d < Dim; ++d) p[d] = mass * points.column(C::velocity + d)[first + lane];
-    stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) {
-      double* at = momentum + node * vector_width;
-      store4(at, load4(at) + p * w);
-    });
+    const double mass = density * points.column(PointColumns<Dim>::volume)[first + lane];
+    scatter_row<0>(points, first + lane, stencil, lane, mass, Lanes4{},
+                   [&](int node, Lanes4 row, const double(&)[Dim]) {
+                     double* at = momentum + node * vector_width;
+                     store4(at, load4(at) + row);
+                   });
   }
 }
 
@@ -58,6 +79,13 @@ void for_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
   with_shape(settings, [&](const auto& shape) { for_chunks(piece.points, lattice, piece.nodes.box, shape, f); });
 }
 
+/// As for_piece, with spin where points carry it.
+template <int Dim, class F>
+void for_moving_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                      F&& f) {
+  with_moving_shape(settings, [&](const auto& shape) { for_chunks(piece.points, lattice, piece.nodes.box, shape, f); });
+}
+
 }  // namespace
 
 template <int Dim>
@@ -65,7 +93,8 @@ void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfe
                    const Law& law, double density, double dt, SpeedLimits& speeds) {
   double fastest = speeds.wave * speeds.wave;
   std::visit(
-      [&](const auto& concrete) {
+      [&](const auto& any) {
+        const auto& concrete = law_of_step(any, dt);
         for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
           const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
           fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
@@ -81,7 +110,8 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
   double fastest = speeds.wave * speeds.wave;
   std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
   std::visit(
-      [&](const auto& concrete) {
+      [&](const auto& any) {
+        const auto& concrete = law_of_step(any, dt);
         for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
           const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
           fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
@@ -95,8 +125,8 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
 
 template <int Dim>
 void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt) {
-  for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    gather_velocity(piece, first, count, stencil, dt, settings.flip);
+  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+    gather_velocity(piece, first, count, stencil, dt, settings);
   });
 }
 
@@ -104,7 +134,7 @@ template <int Dim>
 void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                       double density) {
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
-  for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
     scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
   });
 }
@@ -113,8 +143,8 @@ template <int Dim>
 void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                             double density, double dt) {
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
-  for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    gather_velocity(piece, first, count, stencil, dt, settings.flip);
+  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+    gather_velocity(piece, first, count, stencil, dt, settings);
     scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
   });
 }
@@ -125,17 +155,22 @@ void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings
   using C = PointColumns<Dim>;
   using M = NodeMotion<Dim>;
   Points<Dim>& points = piece.points;
+  constexpr double largest_number = std::numeric_limits<double>::max();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
   double fastest = speeds.point * speeds.point;
   for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
     for (int lane = 0; lane < count; ++lane) {
-      const auto sum = gather_motion(stencil, lane, piece.nodes.motion.data());
+      MotionRow<Dim> sum{};
+      stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) {
+        sum += load_motion<Dim>(piece.nodes.motion.data(), node) * w;
+      });
       double squared = 0;
       for (int d = 0; d < Dim; ++d) {
         points.column(d)[first + lane] += dt * sum[M::velocity + d];
         const double v = points.column(C::velocity + d)[first + lane];
         squared += v * v;
       }
-      fastest = std::max(fastest, squared);
+      fastest = squared <= largest_number ? std::max(fastest, squared) : infinity;
     }
   });
   speeds.point = std::sqrt(fastest);
@@ -185,6 +220,31 @@ void velocity_from_momentum(Piece<Dim>& piece) {
 }
 
 template <int Dim>
+void centre_motion(Piece<Dim>& piece) {
+  using M = NodeMotion<Dim>;
+  NodeBox<Dim>& nodes = piece.nodes;
+  for (std::size_t node = 0; node < nodes.box.size(); ++node)
+    for (int d = 0; d < Dim; ++d) {
+      double& v = nodes.motion[node * M::width + M::velocity + d];
+      v = 0.5 * (v + nodes.velocity[node * vector_width + d]);
+    }
+}
+
+template <int Dim>
+std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>& piece, const Lattice<Dim>& lattice,
+                                                             const TransferSettings<Dim>& settings) {
+  std::vector<std::array<double, spin_size<Dim>>> inertia(piece.points.size());
+  for_moving_piece(piece, lattice, settings, [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
+    if constexpr (Stencil<Dim, Shape>::spinning)
+      for (int lane = 0; lane < count; ++lane)
+        for_spins<Dim>([&](int s, int i, int j) {
+          inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
+        });
+  });
+  return inertia;
+}
+
+template <int Dim>
 void velocity_from_motion(Piece<Dim>& piece) {
   using M = NodeMotion<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
@@ -206,7 +266,10 @@ void velocity_from_motion(Piece<Dim>& piece) {
   template void integrate(Piece<Dim>&, double);                                                                     \
   template void velocity_from_sums(Piece<Dim>&);                                                                    \
   template void velocity_from_momentum(Piece<Dim>&);                                                                \
-  template void velocity_from_motion(Piece<Dim>&);
+  template void velocity_from_motion(Piece<Dim>&);                                                                  \
+  template void centre_motion(Piece<Dim>&);                                                                         \
+  template std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>&, const Lattice<Dim>&,     \
+                                                                        const TransferSettings<Dim>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

@@ -37,6 +37,8 @@ class Program:
 
     def __init__(self, exe: str):
         self.exe = str(Path(exe).resolve())
+        # The address sanitizer cannot live with a limit of the address space (ulimit -v).
+        self.sanitized = b"__asan_init" in Path(self.exe).read_bytes()
         self.mpirun = os.environ.get("CAIRN_MPIRUN") or shutil.which("mpirun")
         if not self.mpirun:
             print("mpirun was not found")

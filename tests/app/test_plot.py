@@ -163,6 +163,33 @@ def real(cairn: Program, scratch: Path):
     assert "no displacement_profile" in said, said
 
 
+def fringes(scratch: Path):
+    """Photoelastic: the brightness that theory gives, where the points are; on a folder, at times, and on one file."""
+    sys.path.insert(0, str(ROOT / "scripts" / "plotting"))
+    from photoelastic import fringe_picture
+    from results import Run
+    write_run(scratch / "fringes", "Fringes", (0.0, WIDTH), 1.0)
+    files = sorted((scratch / "fringes").glob("particles_*.vtkhdf"))
+    parameter, dark = 2e6, 7  # so many dark fringes from left to right
+    with h5py.File(files[0], "r+") as file:
+        x = file["VTKHDF/Points"][:, 0]
+        stress = np.zeros((len(x), 6))
+        stress[:, 3] = 0.5 * parameter * (2 * np.pi * dark * x / WIDTH)  # shear: s1 - s2 is twice as much
+        file["VTKHDF/PointData/stress"][...] = stress
+    run = Run(scratch / "fringes")
+    picture = fringe_picture(run, run.frames[0], parameter, 8 * CELLS)
+    row = picture[int(round(8 * CELLS * (0.5 / GRAINS)))]  # through the centres of a row of grains
+    place = (np.arange(len(row)) + 0.5) / len(row)
+    inside = np.abs((place * GRAINS) % 1 - 0.5) < 0.4
+    wrong = np.abs(row - (0.5 + 0.5 * np.cos(2 * np.pi * dark * place)))[inside]
+    assert wrong.max() < 0.15, f"brightness is off by {wrong.max()}"  # a point is a 240th of the width, 0.09 at most
+    for target, times in ((scratch / "fringes", ["--times", "0", "3e-6"]), (files[3], [])):
+        pictures = scratch / "fringes" / "pictures" / "photoelastic.png"
+        pictures.unlink(missing_ok=True)
+        plot(target, "--fringes", parameter, *times)
+        check_picture(pictures)
+
+
 def nothing(scratch: Path):
     """A folder without results is refused in one line."""
     (scratch / "empty").mkdir()
@@ -175,6 +202,7 @@ def main():
     cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
     nothing(scratch)
     synthetic(scratch)
+    fringes(scratch)
     real(cairn, scratch)
 
 

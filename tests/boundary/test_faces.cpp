@@ -29,6 +29,7 @@ PointState<Dim> mirrored(PointState<Dim> at, int copy) {
   Mat3 Q = Mat3::Identity();
   for (int d = 0; d < Dim; ++d)
     if ((copy >> d) & 1) Q(d, d) = -1, at.x[d] *= -1, at.v[d] *= -1;
+  at.spin = Q.determinant() * Q * at.spin;
   at.F = Q * at.F * Q, at.stress = Q * at.stress * Q;
   return at;
 }

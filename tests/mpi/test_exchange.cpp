@@ -34,7 +34,10 @@ std::map<std::pair<int, Index<Dim>>, NodeValues<Dim>> naive_sums(const World<Dim
       NodeValues<Dim>& at = sums[{point.body, canonical(world.lattice, i)}];
       double* to = at.data();
       *to++ += m * w;
-      for (int d = 0; d < Dim; ++d) *to++ += m * w * point.state.v[d];
+      Vec<Dim> arm;
+      for (int d = 0; d < Dim; ++d) arm[d] = world.lattice.node_position(d, i[d]) - point.state.x[d];
+      const Vec<Dim> v = point.state.v + turning<Dim>(point.state.spin, arm);
+      for (int d = 0; d < Dim; ++d) *to++ += m * w * v[d];
       *to++ += V * w;
       for (int d = 0; d < Dim; ++d) *to++ += V * g[d];
       for (int d = 0; d < Dim; ++d) {

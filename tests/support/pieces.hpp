@@ -18,6 +18,7 @@ struct PointState {
   Vec<Dim> x, v;
   Mat3 F, stress;
   double volume0;
+  Vec3 spin = Vec3::Zero();
   double volume() const { return volume0 * F.determinant(); }
 };
 
@@ -30,6 +31,7 @@ void put_point(Points<Dim>& points, int p, const PointState<Dim>& state) {
   for (int i = 0; i < tensor_size<Dim>; ++i) points.column(C::deformation + i)[p] = F.c[i];
   for (int i = 0; i < symmetric_size<Dim>; ++i) points.column(C::stress + i)[p] = s.c[i];
   points.column(C::volume)[p] = state.volume0;
+  for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = state.spin[Dim == 2 ? 2 : s];
 }
 
 template <int Dim>
@@ -42,14 +44,23 @@ PointState<Dim> get_point(const Points<Dim>& points, int p) {
   for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
   for (int i = 0; i < symmetric_size<Dim>; ++i) s.c[i] = points.column(C::stress + i)[p];
   state.F = matrix(F), state.stress = matrix(s), state.volume0 = points.column(C::volume)[p];
+  for (int s = 0; s < spin_size<Dim>; ++s) state.spin[Dim == 2 ? 2 : s] = points.column(C::spin + s)[p];
   return state;
+}
+
+/// w x arm.
+template <int Dim>
+Vec<Dim> turning(const Vec3& spin, const Vec<Dim>& arm) {
+  Vec3 r = Vec3::Zero();
+  r.head<Dim>() = arm;
+  return spin.cross(r).template head<Dim>();
 }
 
 /// A random state at x: stress of the order of `stress` [Pa].
 template <int Dim>
 PointState<Dim> random_point(Random& random, const Vec<Dim>& x, double stress) {
   return {x, random.vector<Dim>(2), Mat3::Identity() + random_matrix<Dim>(random, 0.15),
-          random_symmetric<Dim>(random, stress), random(1e-3, 2e-3)};
+          random_symmetric<Dim>(random, stress), random(1e-3, 2e-3), Vec3(random(-3, 3), random(-3, 3), random(-3, 3))};
 }
 
 /// `count` random points between two corners given in cells.
@@ -107,7 +118,7 @@ struct NaiveSums {
   Eigen::Matrix<double, 9, Eigen::Dynamic> stress;
 
   NaiveSums(const Points<Dim>& points, const Lattice<Dim>& lattice, const Box<Dim>& box, const Formula& shape,
-            const Formula& normals, double density, const Vec<Dim>& gravity) {
+            const Formula& normals, double density, const Vec<Dim>& gravity, bool spin) {
     const auto n = static_cast<Eigen::Index>(box.size());
     mass = volume = Eigen::RowVectorXd::Zero(n);
     momentum = force = volume_gradient = mass_gradient = position = Columns::Zero(Dim, n);
@@ -122,6 +133,7 @@ struct NaiveSums {
         for (int d = 0; d < Dim; ++d) node_x[d] = lattice.node_position(d, node[d]);
         mass[i] += m * w, volume[i] += V * w;
         momentum.col(i) += m * w * at.v;
+        if (spin) momentum.col(i) += m * w * turning<Dim>(at.spin, node_x - at.x);
         const Mat3 flux = V * at.stress;
         force.col(i) += m * w * gravity - flux.topLeftCorner<Dim, Dim>() * g;
         const Vec<Dim> outward = weight_of(lattice, normals, at.x, node).second;

@@ -20,6 +20,7 @@
 ///     fraction = 0.85                # area (2D) or volume (3D) fraction of the box
 ///     seed = 1
 ///     max_overlap = 0.001            # largest overlap allowed, of the smaller radius
+///     effort = 1.0                   # how long to search
 ///     [sizes]                        # diameters [m]
 ///     type = "fit"                   # uniform { min, max } | lognormal { mean, sigma, min, max }
 ///     min = 31.0e-6                  # list { diameters, weights } | fit { min, max, mean }
@@ -28,7 +29,6 @@
 ///     scale = false                  # true: diameters are relative, scaled so that count and fraction both hold
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -68,6 +68,7 @@ struct PackSpec {
   double fraction = 0;                              // area or volume fraction of the box; 0: from `count`
   std::uint64_t seed = 1;
   double max_overlap = 0.001;  // largest overlap of a pair, of its smaller radius; above 0, below 0.1
+  double effort = 1;           // the search ends after 3e8, or 4e4 for each grain, grains times iterations times this
   SizeSpec sizes;
 };
 
@@ -81,16 +82,16 @@ struct Pack {
 };
 
 /// What is wrong with the spec, one line for each error (key, value, remedy); empty where it can be tried.
-/// Includes count, sizes, box and fraction that contradict each other.
+/// Includes count, sizes, box and fraction that contradict each other, and grains for which there is too little memory.
 std::vector<std::string> check_pack(const PackSpec& spec);
 
 /// Makes the pack. Throws InputError with the lines of `check_pack`; RunError where the fraction is not reached
 /// within the overlap allowed: the message gives what was reached.
 Pack pack_grains(const PackSpec& spec);
 
-/// Writes the grain table: CSV with header `x,y,r` or `x,y,z,r` [m], shortest numbers that read back to the same bits,
-/// and '#' comments with the spec and the figures delivered. Throws RunError where the file cannot be written.
-void write_pack(const std::filesystem::path& path, const Pack& pack, const PackSpec& spec);
+/// The grain table as text: CSV with header `x,y,r` or `x,y,z,r` [m], shortest numbers that read back to the same bits,
+/// and '#' comments with the spec and the figures delivered.
+std::string pack_table(const Pack& pack, const PackSpec& spec);
 
 /// Area (2D) or volume (3D) [m^2, m^3] of the part of a disk or sphere inside a box; directions marked in `whole` do
 /// not cut. Closed form in 2D; in 3D by quadrature to about 1e-6 of the sphere.

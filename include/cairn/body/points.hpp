@@ -10,12 +10,17 @@
 
 namespace cairn {
 
+/// Components of an angular velocity: that about z alone in 2D.
+template <int Dim>
+inline constexpr int spin_size = Dim == 2 ? 1 : 3;
+
 /// First column of each quantity.
 template <int Dim>
 struct PointColumns {
   static constexpr int position = 0;                             // [m]
   static constexpr int velocity = Dim;                           // [m/s]
-  static constexpr int deformation = 2 * Dim;                    // deformation gradient F (tensor_size columns)
+  static constexpr int spin = 2 * Dim;                           // angular velocity [rad/s] (spin_size columns)
+  static constexpr int deformation = spin + spin_size<Dim>;      // deformation gradient F (tensor_size columns)
   static constexpr int stress = deformation + tensor_size<Dim>;  // Cauchy stress [Pa] (symmetric_size columns)
   static constexpr int volume = stress + symmetric_size<Dim>;    // reference volume [m^Dim]
   static constexpr int state = volume + 1;                       // the law's own variables

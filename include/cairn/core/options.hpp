@@ -15,6 +15,8 @@ enum class NormalChoice { common, own };
 enum class Gate { node, body };
 enum class DepartingFriction { none, coulomb, printed };
 enum class Passes { both, before, after };
+/// What holds across the plane of a 2D case: no strain, or no stress.
+enum class Plane { strain, stress };
 enum class FaceType { free, fixed, symmetry, wall, periodic };
 
 /// How patches are dealt to ranks; never changes a result.
@@ -30,6 +32,7 @@ struct SolverOptions {
   ShapeFunction shape = ShapeFunction::gimp;
   StressUpdate stress_update = StressUpdate::both;
   double flip = 1.0;        // 1: FLIP, 0: PIC
+  bool spin = true;         // points carry an angular velocity
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };

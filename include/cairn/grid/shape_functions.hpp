@@ -2,6 +2,8 @@
 /// Shape functions as tensor products of one-dimensional weights. Each is a small struct that evaluates, for eight
 /// points at once, the values and slopes at its `nodes` consecutive nodes along one direction. Lengths in cells.
 
+#include <type_traits>
+
 #include "cairn/core/lanes.hpp"
 #include "cairn/grid/lattice.hpp"
 
@@ -88,13 +90,23 @@ struct CellDensityShape {
   }
 };
 
+/// A shape function of points that carry spin: stencils also hold the arms from a point to its nodes.
+template <class Shape>
+struct Spinning : Shape {
+  static constexpr bool spinning = true;
+};
+
 /// Weights of eight points on the nodes of a box.
 template <int Dim, class Shape>
 struct Stencil {
   static constexpr int n = Shape::nodes;
+  static constexpr bool spinning = requires { Shape::spinning; };
   alignas(64) double value[Dim][n][lane_count];
   alignas(64) double slope[Dim][n][lane_count];  // [1/m]
   alignas(64) double first[lane_count];          // offset of the first node in the box
+  // With spin: node minus point [m], and sum N arm^2 [m2], along each direction.
+  alignas(64) double arm[spinning ? Dim : 1][n][lane_count];
+  alignas(64) double spread[spinning ? Dim : 1][lane_count];
   int stride[3];
 
   /// `x[d]` points to the positions along d [m], on a 64-byte boundary.
@@ -110,12 +122,22 @@ struct Stencil {
         store(value[d][k], v[k]);
         store(slope[d][k], s[k] * lattice.inverse_spacing()[d]);
       }
+      if constexpr (spinning) {
+        Lanes sum{};
+        for (int k = 0; k < n; ++k) {
+          const Lanes a = (start + static_cast<double>(k) - xi) * lattice.spacing()[d];
+          sum += v[k] * a * a;
+          store(arm[d][k], a);
+        }
+        store(spread[d], sum);
+      }
       offset += (start - static_cast<double>(box.lower[d])) * static_cast<double>(stride[d]);
     }
     store(first, offset);
   }
 
-  /// Calls f(offset, weight, gradient[Dim]) for every node of the point in `lane`.
+  /// Calls f(offset, weight, gradient[Dim]), or f(offset, weight, gradient[Dim], arm[Dim]), for every node of the point
+  /// in `lane`.
   template <class F>
   void for_nodes(int lane, F&& f) const {
     const int origin = static_cast<int>(first[lane]);
@@ -127,7 +149,7 @@ struct Stencil {
         for (int i = 0; i < n; ++i) {
           const double vx = value[0][i][lane];
           const double gradient[2] = {slope[0][i][lane] * vy, vx * sy};
-          f(origin + j * stride[1] + i, vx * vy, gradient);
+          call(f, origin + j * stride[1] + i, vx * vy, gradient, lane, {i, j});
         }
       }
     } else {
@@ -142,10 +164,22 @@ struct Stencil {
           for (int i = 0; i < n; ++i) {
             const double vx = value[0][i][lane];
             const double gradient[3] = {slope[0][i][lane] * vyz, vx * syz, vx * vsz};
-            f(origin + k * stride[2] + j * stride[1] + i, vx * vyz, gradient);
+            call(f, origin + k * stride[2] + j * stride[1] + i, vx * vyz, gradient, lane, {i, j, k});
           }
         }
       }
+    }
+  }
+
+ private:
+  template <class F>
+  void call(F& f, int node, double weight, const double (&gradient)[Dim], int lane, const Index<Dim>& at) const {
+    if constexpr (std::is_invocable_v<F&, int, double, const double(&)[Dim], const double(&)[Dim]>) {
+      double arms[Dim];
+      for (int d = 0; d < Dim; ++d) arms[d] = arm[d][at[d]][lane];
+      f(node, weight, gradient, arms);
+    } else {
+      f(node, weight, gradient);
     }
   }
 };

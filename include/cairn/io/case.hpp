@@ -35,7 +35,8 @@ struct Material {
   std::string name;
   std::string model;                         // a name of material/registry.hpp
   double density = 0;                        // [kg/m3]
-  std::map<std::string, double> parameters;  // keyed as in the law's table, every one filled in
+  std::map<std::string, double> parameters;  // keyed as in the law's table, every one filled in; lists by list_key
+  Plane plane = Plane::strain;               // in 2D
 };
 
 /// One body: its shape, material and rigid initial motion.
@@ -44,6 +45,7 @@ struct BodySpec {
   int material = 0;                      // index into Case::materials
   Vec3 velocity = Vec3::Zero();          // [m/s]
   Vec3 angular_velocity = Vec3::Zero();  // [rad/s] about the shape's centre
+  double initial_pressure = 0;           // hydrostatic [Pa], positive in compression
   std::string group;
   std::string source;  // where it was defined, for messages: "case.toml:31" or "pack.csv:12"
 };

@@ -16,6 +16,7 @@ struct Hypoelastic {
   static constexpr bool rigid = false;
 
   ElasticModuli moduli;
+  Plane plane = Plane::strain;
   explicit Hypoelastic(const ParameterValues& values) : moduli(values) {}
 
   /// New stress [Pa] from A = dt L; state: stress work per reference volume [J/m3].
@@ -25,6 +26,19 @@ struct Hypoelastic {
     stress = moduli.predict(A, D, old);
     state[0] += 0.5 * J * (contraction(old, D) + contraction(stress, D));
     return J * moduli.longitudinal();
+  }
+
+  /// Plane stress: the increment A_zz for which the new sigma_zz vanishes.
+  template <class T>
+  T out_of_plane(const Tensor<2, T>& A, const Tensor<2, T>& /*F*/, const Symmetric<2, T>& stress,
+                 const T* /*state*/) const {
+    return moduli.out_of_plane(A, stress.c[2]);
+  }
+
+  /// Sets the state of a body under hydrostatic pressure [Pa] and returns its det F.
+  double pressurise(double pressure, double* state) const {
+    state[0] = moduli.hydrostatic_work(pressure);
+    return moduli.volume_ratio(pressure);
   }
 
   template <int Dim>

@@ -22,6 +22,7 @@ struct VonMises {
   static constexpr bool rigid = false;
 
   ElasticModuli moduli;
+  Plane plane = Plane::strain;
   double yield_stress, hardening_modulus;  // [Pa]
   explicit VonMises(const ParameterValues& values)
       : moduli(values), yield_stress(values.at("yield_stress")), hardening_modulus(values.at("hardening_modulus")) {}
@@ -43,6 +44,37 @@ struct VonMises {
     // The mean of the old and new yield stress: exact for radial loading.
     state[2] += J * strain * (yield_stress + hardening_modulus * (state[0] - 0.5 * strain));
     return J * moduli.longitudinal();
+  }
+
+  /// Plane stress: the increment A_zz for which the new sigma_zz vanishes. With c the zz component of the predictor's
+  /// deviator, sigma_zz is an increasing function of c: linear inside the yield surface; beyond it, concave for c > 0
+  /// and odd. Newton's iteration from the elastic root, which lies on the side of zero, then never overshoots.
+  template <class T>
+  T out_of_plane(const Tensor<2, T>& A, const Tensor<2, T>& /*F*/, const Symmetric<2, T>& stress,
+                 const T* state) const {
+    const Symmetric<2, T> trial = moduli.predict(A, symmetric_part(A), stress);  // with A_zz = 0
+    const T mean = trace(trial) * (1.0 / 3.0);
+    const Symmetric<2, T> deviator = scale_and_shift(trial, T{} + 1.0, -mean);
+    const T c0 = deviator.c[2];
+    const T rest = 1.5 * contraction(deviator, deviator) - 2.25 * c0 * c0;  // the part of q^2 that A_zz does not change
+    const T limit = yield_stress + hardening_modulus * state[0];
+    const double ratio = 0.75 * moduli.bulk / moduli.shear;  // d mean / dc
+    const double share = 3.0 * moduli.shear / (3.0 * moduli.shear + hardening_modulus);
+    T c = c0 - (mean + c0) * (1.0 / (1.0 + ratio));
+    for (int i = 0; i < plane_stress_iterations; ++i) {
+      const T q = square_root(maximum(rest + 2.25 * c * c, T{} + 1e-300));
+      const T yielded = limit / q;  // below 1 beyond the yield surface
+      const T scale = 1.0 - share * maximum(1.0 - yielded, T{});
+      const T slope = select(yielded < 1.0, share * 2.25 * c * c * yielded / (q * q), 0.0);
+      c -= (mean + ratio * (c - c0) + scale * c) / (ratio + scale - slope);
+    }
+    return (c - c0) * (0.75 / moduli.shear);
+  }
+
+  /// Sets the state of a body under hydrostatic pressure [Pa] and returns its det F.
+  double pressurise(double pressure, double* state) const {
+    state[1] = moduli.hydrostatic_work(pressure);
+    return moduli.volume_ratio(pressure);
   }
 
   template <int Dim>

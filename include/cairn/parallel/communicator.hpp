@@ -42,7 +42,7 @@ struct Traffic {
 class NeighbourExchange {
  public:
   NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours);  // neighbours: ascending, without the rank itself
-  ~NeighbourExchange() { wait(); }
+  ~NeighbourExchange();
   NeighbourExchange(const NeighbourExchange&) = delete;
   NeighbourExchange& operator=(const NeighbourExchange&) = delete;
   NeighbourExchange(NeighbourExchange&&) = delete;

@@ -12,6 +12,7 @@ struct BodyState {
   Vec3 centre = Vec3::Zero();            // [m]
   Vec3 velocity = Vec3::Zero();          // [m/s]
   Vec3 angular_velocity = Vec3::Zero();  // of the rigid motion with the same angular momentum [rad/s]
+  Vec3 angular_momentum = Vec3::Zero();  // about the centre [kg m2/s]
   std::array<double, 6> mean_stress{};   // xx yy zz xy yz xz [Pa]
   int contacts = 0;                      // bodies touched since the contacts were last cleared
 };

@@ -23,7 +23,8 @@ class EnergyBook {
   void add(const Totals& t) {
     if (!state_.started) state_.started = 1, state_.initial = t.energy(), state_.initial_potential = t.potential;
     state_.largest =
-        std::max({state_.largest, t.kinetic + t.strain + t.plastic + std::abs(t.potential - state_.initial_potential),
+        std::max({state_.largest,
+                  t.kinetic + t.strain + t.plastic + t.viscous + std::abs(t.potential - state_.initial_potential),
                   std::abs(t.boundary_work)});
     state_.error = state_.largest > 0 ? (t.energy() - state_.initial) / state_.largest : 0.0;
   }

@@ -27,11 +27,14 @@ struct SolverMaterial {
 /// Sums over all points and nodes, the same bits on any number of ranks (sums of patch sums in patch order).
 struct Totals {
   double kinetic = 0, strain = 0, potential = 0, plastic = 0;  // [J]; rigid bodies are left out
+  double viscous = 0;                                          // [J], dissipated in the material; likewise
   double contact_dissipation = 0, boundary_work = 0;           // [J], since the start
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0;                                             // [kg]
   double contact_nodes = 0;
-  double energy() const { return kinetic + strain + potential + plastic + contact_dissipation - boundary_work; }
+  double energy() const {
+    return kinetic + strain + potential + plastic + viscous + contact_dissipation - boundary_work;
+  }
 };
 
 /// Where the stepping stands: with the points, all that the next step depends on.
@@ -58,7 +61,8 @@ class Simulation {
   Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from = nullptr);
 
   /// Advances one step of at most `longest` seconds. Collective.
-  /// \throws RunError on every rank when a point is lost or the time step collapses
+  /// \throws RunError on every rank, then or at the next call, when a point is lost, inverted or not finite, or the
+  /// time step collapses
   void step(double longest);
 
   /// Waits for the speeds of the last step. Collective. \throws RunError on every rank where that step lost a point
@@ -76,6 +80,7 @@ class Simulation {
   std::int64_t steps() const { return steps_; }
   std::int64_t total_points() const { return total_points_; }
   const Lattice<Dim>& lattice() const { return lattice_; }
+  const TransferSettings<Dim>& transfer() const { return transfer_; }
   const std::vector<SolverMaterial>& materials() const { return materials_; }
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<Patch<Dim>>& patches() const { return patches_; }  // of this rank, ascending
@@ -136,6 +141,7 @@ class Simulation {
     });
   }
   void move_rigid(Piece<Dim>& piece);
+  void look_for_fault(int urgency);
   void start_speed_reduction();
   void finish_speed_reduction();
 
@@ -165,6 +171,8 @@ class Simulation {
   SpeedLimits speeds_;  // of this rank, in the step under way
   static constexpr int speed_size = 5;
   double speed_message_[speed_size] = {}, speed_result_[speed_size] = {};  // wave, point, failure, stop, wall
+  int fault_urgency_ = 0;  // of this rank's first fault: the earlier its stage in the step, the more
+  std::string fault_;
   std::function<Notice()> ask_;
   MPI_Request speed_request_ = MPI_REQUEST_NULL;
 };

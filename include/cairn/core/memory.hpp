@@ -1,0 +1,12 @@
+#pragma once
+/// How much memory there is.
+
+namespace cairn {
+
+/// What the system can give without swapping [bytes]; infinite where it does not say.
+double available_memory();
+
+/// What this process may use: the lowest of its limits (ulimit -v, ulimit -m) [bytes]; infinite where there is none.
+double memory_limit();
+
+}  // namespace cairn

@@ -1,0 +1,66 @@
+#include "fault.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace cairn {
+namespace {
+
+template <int Dim>
+double determinant_of(const Points<Dim>& points, int p) {
+  Tensor<Dim, double> F;
+  for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(PointColumns<Dim>::deformation + i)[p];
+  return determinant(F);
+}
+
+/// `size` numbers of a point, from column `first` on.
+template <int Dim>
+std::vector<double> numbers_of(const Points<Dim>& points, int p, int first, int size) {
+  std::vector<double> values;
+  for (int c = first; c < first + size; ++c) values.push_back(points.column(c)[p]);
+  return values;
+}
+
+bool all_finite(const std::vector<double>& values) {
+  return std::ranges::all_of(values, [](double a) { return std::isfinite(a); });
+}
+
+template <int Dim>
+Fault fault_of(const Points<Dim>& points, int p) {
+  using C = PointColumns<Dim>;
+  const double J = determinant_of(points, p);
+  if (std::isfinite(J) && J <= 0) return {Fault::inverted, fmt::format("is inverted: det F = {:.6g}", J)};
+  const auto report = [](Fault::Kind kind, const char* name, const std::vector<double>& values, const char* unit) {
+    return Fault{kind, fmt::format("is not finite: {} ({:.6g}){}", name, fmt::join(values, ", "), unit)};
+  };
+  const auto x = numbers_of(points, p, C::position, Dim), v = numbers_of(points, p, C::velocity, Dim);
+  if (!all_finite(x) || !all_finite(v)) return report(Fault::motion, "velocity", v, " m/s");
+  if (!std::isfinite(J)) return report(Fault::state, "det F =", {J}, "");
+  const auto stress = numbers_of(points, p, C::stress, symmetric_size<Dim>);
+  if (!all_finite(stress)) return report(Fault::state, "stress", stress, " Pa");
+  return {};
+}
+
+}  // namespace
+
+template <int Dim>
+Fault find_fault(const std::vector<Patch<Dim>>& patches, const std::vector<Body>& bodies) {
+  Fault worst{Fault::none, "a point's wave speed or velocity is too large for a number"};
+  for (const auto& patch : patches)
+    for (const auto& piece : patch.pieces)
+      for (int p = 0; p < piece.points.size() && !bodies[piece.body].rigid; ++p) {
+        const Fault fault = fault_of(piece.points, p);
+        if (fault.kind <= worst.kind) continue;
+        const auto x = numbers_of(piece.points, p, PointColumns<Dim>::position, Dim);
+        worst = {fault.kind, fmt::format("point {} of body {} at ({:.6g}) m {}", piece.points.ids()[p], piece.body,
+                                         fmt::join(x, ", "), fault.text)};
+      }
+  return worst;
+}
+
+template Fault find_fault(const std::vector<Patch<2>>&, const std::vector<Body>&);
+template Fault find_fault(const std::vector<Patch<3>>&, const std::vector<Body>&);
+
+}  // namespace cairn

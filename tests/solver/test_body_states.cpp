@@ -1,0 +1,45 @@
+// Motion of whole bodies: centre, velocity and angular velocity, as in bodies.csv and the grain files.
+
+#include <gtest/gtest.h>
+
+#include "../support/cases.hpp"
+#include "../support/mpi_environment.hpp"
+#include "cairn/solver/body_states.hpp"
+
+namespace cairn {
+namespace {
+
+using namespace test;
+
+/// A body that moves and spins at once, reaching across several patches: its state is the motion it was given.
+template <int Dim>
+void check_motion(const Shape& shape, bool periodic) {
+  Case c = soft_case(Dim, Dim == 2 ? 24 : 12, 4);
+  const double z = Dim == 3 ? 1 : 0;
+  c.domain.periodic = {periodic, periodic, false};
+  const Vec3 velocity(0.3, -0.2, 0.1 * z), spin(0.7 * z, -1.1 * z, 2.3);
+  add_body(c, shape, velocity, spin);
+  Simulation<Dim> simulation(c, MPI_COMM_WORLD);
+  const BodyState s = body_states(simulation).at(0);
+  // The points' centre differs a little from the shape's, and moves as a point of the rigid body.
+  EXPECT_LE((s.centre - centre(shape)).norm(), 0.3 / 12);
+  const Vec3 expected = velocity + spin.cross(s.centre - centre(shape));
+  EXPECT_LE((s.velocity - expected).norm(), 1e-12);
+  EXPECT_LE((s.angular_velocity - spin).norm(), 1e-11);
+  EXPECT_NEAR(s.mass, simulation.totals().mass, 1e-12 * s.mass);
+}
+TEST(BodyStates, MotionOfADiskAndABlock) {
+  check_motion<2>(Ball{Vec3(0.47, 0.53, 0), 0.23}, false);
+  check_motion<2>(BoxShape{Vec3(0.2, 0.31, 0), Vec3(0.8, 0.57, 0), 0.4}, false);
+}
+TEST(BodyStates, MotionOfASphereAndABlock) {
+  check_motion<3>(Ball{Vec3(0.47, 0.53, 0.51), 0.23}, false);
+  check_motion<3>(BoxShape{Vec3(0.2, 0.3, 0.35), Vec3(0.8, 0.6, 0.55), 0.4}, false);
+}
+TEST(BodyStates, MotionAcrossPeriodicBoundaries) {
+  check_motion<2>(Ball{Vec3(0.97, 0.06, 0), 0.23}, true);
+  check_motion<3>(Ball{Vec3(0.06, 0.97, 0.51), 0.23}, true);
+}
+
+}  // namespace
+}  // namespace cairn
