@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cerrno>
+#include <cstring>
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
@@ -18,6 +19,7 @@ struct TableReader::State {
   std::filesystem::path file;
   MPI_Comm comm;
   Handle handle;
+  PosixFile data;  // for the values
   std::int64_t rows = 0, step = 0;
   double time = 0;
   std::string kind;
@@ -33,47 +35,6 @@ struct TableReader::State {
 
 namespace {
 
-hsize_t size_of(std::int64_t n) { return static_cast<hsize_t>(n); }
-
-/// Columns of one component are one-dimensional.
-Handle make_space(std::int64_t rows, int components) {
-  const hsize_t extent[2] = {size_of(rows), size_of(components)};
-  return {H5Screate_simple(components == 1 ? 1 : 2, extent, nullptr), H5Sclose};
-}
-
-Handle select_blocks(std::span<const RowBlocks::Block> blocks, std::int64_t total_rows, int components) {
-  constexpr std::size_t few = 32;
-  if (blocks.size() > few) {
-    const std::size_t half = blocks.size() / 2;
-    const Handle lower = select_blocks(blocks.first(half), total_rows, components);
-    const Handle upper = select_blocks(blocks.subspan(half), total_rows, components);
-    if (!lower.valid() || !upper.valid()) return {};
-    return {H5Scombine_select(lower, H5S_SELECT_OR, upper), H5Sclose};
-  }
-  Handle space = make_space(total_rows, components);
-  if (!space.valid() || H5Sselect_none(space) < 0) return {};
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
-    const hsize_t start[2] = {size_of(blocks[i].file_row), 0};
-    const hsize_t count[2] = {size_of(blocks[i].count), size_of(components)};
-    if (H5Sselect_hyperslab(space, i == 0 ? H5S_SELECT_SET : H5S_SELECT_OR, start, nullptr, count, nullptr) < 0)
-      return {};
-  }
-  return space;
-}
-
-/// File rows of a rank as a selection of a dataset of `total_rows` x `components` values; empty handle on failure.
-/// The selection is built by halves: adding the blocks one by one would take time quadratic in their number.
-Handle select_rows(const RowBlocks& rows, int components) {
-  return select_blocks(merged_blocks(rows), rows.total_rows, components);
-}
-
-/// Space of `rows` x `components` values in memory, all selected.
-Handle memory_space(std::int64_t rows, int components) {
-  Handle space = make_space(rows, components);
-  if (rows == 0 && space.valid() && H5Sselect_none(space) < 0) return {};
-  return space;
-}
-
 /// Whether the dataset has `rows` x `components` values; one component means one dimension.
 std::string check_shape(hid_t dataset, const std::string& column, std::int64_t rows, int components) {
   const Handle space(H5Dget_space(dataset), H5Sclose);
@@ -83,6 +44,17 @@ std::string check_shape(hid_t dataset, const std::string& column, std::int64_t r
       (components == 1 || extent[1] == static_cast<hsize_t>(components)))
     return {};
   return fmt::format("column {} does not have {} rows of {} values", column, rows, components);
+}
+
+/// Where in the file the values of a dataset lie, one after the other as in memory: -1 where they do not. Without rows
+/// they lie nowhere.
+template <class T>
+std::int64_t place_of(hid_t dataset) {
+  const Handle space(H5Dget_space(dataset), H5Sclose), type(H5Dget_type(dataset), H5Tclose);
+  if (H5Tequal(type, hdf5::native_type<T>()) <= 0) return -1;
+  if (H5Sget_simple_extent_npoints(space) == 0) return 0;
+  const haddr_t place = H5Dget_offset(dataset);
+  return place == HADDR_UNDEF ? -1 : static_cast<std::int64_t>(place);
 }
 
 }  // namespace
@@ -96,15 +68,18 @@ void TableReader::State::read(const std::string& column, int components, const R
   require_input(dataset.valid() ? check_shape(dataset, column, wanted.total_rows, components)
                                 : "it has no column " + column);
 
-  errno = 0;
-  const Handle in_memory = memory_space(wanted.local_rows(), components), in_file = select_rows(wanted, components);
-  const bool ready = in_memory.valid() && in_file.valid();
-  throw_together(comm, ready ? "" : fmt::format("cannot read {}: {}", file.string(), hdf5::error_text()));
-  // A dataset without rows has no place in the file, and HDF5 fails to read nothing from there.
-  const bool good = wanted.total_rows == 0 ||
-                    H5Dread(dataset, hdf5::native_type<T>(), in_memory, in_file, H5P_DEFAULT, values.data()) >= 0;
-  throw_together(comm,
-                 good ? "" : fmt::format("cannot read {}: column {}: {}", file.string(), column, hdf5::error_text()));
+  const std::int64_t row_bytes = components * static_cast<std::int64_t>(sizeof(T)), place = place_of<T>(dataset);
+  require_input(place >= 0 ? "" : fmt::format("column {} is not stored as one piece of this type", column));
+  auto* bytes = reinterpret_cast<char*>(values.data());
+  std::string error;
+  for (const auto& block : merged_blocks(wanted)) {
+    const std::int64_t count = block.count * row_bytes;
+    if (error.empty() && !data.read(bytes, count, place + block.file_row * row_bytes))
+      error = fmt::format("cannot read {}: column {}: {}", file.string(), column,
+                          errno != 0 ? std::strerror(errno) : "it ends early");
+    bytes += count;
+  }
+  throw_together(comm, error);
 }
 
 TableReader::TableReader(const std::filesystem::path& file, MPI_Comm comm) : state_(std::make_unique<State>()) {
@@ -116,6 +91,8 @@ TableReader::TableReader(const std::filesystem::path& file, MPI_Comm comm) : sta
   errno = 0;
   state_->handle = Handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   state_->require_input(state_->handle.valid() ? "" : "not a whole HDF5 file: " + hdf5::error_text());
+  state_->data = PosixFile(file, O_RDONLY);
+  state_->require_input(state_->data.valid() ? "" : std::strerror(errno));
   const Handle root(H5Gopen2(state_->handle, "/", H5P_DEFAULT), H5Gclose);
   const bool complete =
       hdf5::read_attribute(root, "rows", state_->rows) && hdf5::read_attribute(root, "time", state_->time) &&

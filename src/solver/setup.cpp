@@ -235,6 +235,8 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   bodies_ = make_bodies(c, materials_);
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
+  for (int d = 0; d < Dim; ++d)
+    for (int side = 0; side < 2; ++side) transfer_.mirrored[d][side] = faces_[2 * d + side].type == FaceType::symmetry;
   if (from)
     restore(*from);
   else

@@ -29,10 +29,8 @@ void Simulation<Dim>::step(double longest) {
   contact_before_update();
   if (first) strain_first(share);
   contact_after_update(!again);
-  accelerate_points(again);
-  if (again) project_again();
-  if (update != StressUpdate::first) strain_last(share);
-  move_points();
+  if (again) accelerate_points(), project_again();
+  finish_points(share);
   migrate_points();
   time_ += dt_;
   ++steps_;
@@ -123,17 +121,14 @@ void Simulation<Dim>::contact_after_update(bool last) {
 }
 
 template <int Dim>
-void Simulation<Dim>::accelerate_points(bool again) {
+void Simulation<Dim>::accelerate_points() {
   const auto time = timers_.measure(Stage::update);
   for_pieces([&](Piece<Dim>& piece) {
     const double density = material_of(piece).density;
-    if (is_rigid(piece)) {
-      if (again) project_momentum(piece, lattice_, transfer_, density);
-    } else if (again) {
+    if (is_rigid(piece))
+      project_momentum(piece, lattice_, transfer_, density);
+    else
       accelerate_and_project(piece, lattice_, transfer_, density, dt_);
-    } else {
-      accelerate(piece, lattice_, transfer_, dt_);
-    }
   });
 }
 
@@ -154,26 +149,20 @@ void Simulation<Dim>::project_again() {
   for_pieces([&](Piece<Dim>& piece) { centre_motion(piece); });
 }
 
+/// The last pass over the points: what is left to do with them, and they move.
 template <int Dim>
-void Simulation<Dim>::strain_last(double share) {
-  const auto time = timers_.measure(Stage::stress);
+void Simulation<Dim>::finish_points(double share) {
+  const auto time = timers_.measure(solver_.stress_update == StressUpdate::first ? Stage::update : Stage::stress);
   for_pieces([&](Piece<Dim>& piece) {
-    if (solver_.stress_update == StressUpdate::last) velocity_from_motion(piece);
     const auto& material = material_of(piece);
-    if (!is_rigid(piece))
-      update_stress(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
-  });
-  look_for_fault(2);
-}
-
-template <int Dim>
-void Simulation<Dim>::move_points() {
-  const auto time = timers_.measure(Stage::update);
-  for_pieces([&](Piece<Dim>& piece) {
-    if (is_rigid(piece))
-      move_rigid(piece);
-    else
-      move(piece, lattice_, transfer_, dt_, speeds_);
+    if (is_rigid(piece)) return move_rigid(piece);
+    if (solver_.stress_update == StressUpdate::first)
+      return accelerate_and_move(piece, lattice_, transfer_, dt_, speeds_);
+    if (solver_.stress_update == StressUpdate::last) {
+      accelerate(piece, lattice_, transfer_, dt_);
+      velocity_from_motion(piece);
+    }
+    update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
   });
   look_for_fault(1);
 }

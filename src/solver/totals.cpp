@@ -38,7 +38,8 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, const
             height += gravity[d] * (points.column(d)[p] + points.images()[p][d] * simulation.lattice().length(d));
             sums[6 + d] += mass * v;
           }
-          for (int s = 0; s < spin_size<Dim>; ++s) squared += inertia[p][s] * std::pow(points.column(C::spin + s)[p], 2);
+          for (int s = 0; s < spin_size<Dim>; ++s)
+            squared += inertia[p][s] * std::pow(points.column(C::spin + s)[p], 2);
           sums[0] += 0.5 * mass * squared;
           sums[1] += volume * law.strain_energy(deformation_of(points, p), state.data());
           sums[2] -= mass * height;

@@ -26,9 +26,7 @@ void with_shape(const TransferSettings<Dim>& settings, F&& f) {
 /// As with_shape, for what moves points or their momentum: the shape is `Spinning` where points carry spin.
 template <int Dim, class F>
 void with_moving_shape(const TransferSettings<Dim>& settings, F&& f) {
-  with_shape(settings, [&]<class Shape>(const Shape& shape) {
-    settings.spin ? f(Spinning<Shape>{shape}) : f(shape);
-  });
+  with_shape(settings, [&]<class Shape>(const Shape& shape) { settings.spin ? f(Spinning<Shape>{shape}) : f(shape); });
 }
 
 /// Calls f(shape) with the weights of the normals, where they are not those of the shape function.

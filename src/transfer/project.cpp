@@ -103,6 +103,9 @@ Box<Dim> touched_nodes(const Points<Dim>& points, const Lattice<Dim>& lattice, c
     };
     with_shape(settings, widen);
     if (settings.normals_needed) with_normal_shape(settings, widen);
+    // The image of a body that reaches a symmetry plane may touch the nodes beyond, which other bodies use.
+    if (settings.mirrored[d][0] && box.lower[d] == 0) box.lower[d] = -1;
+    if (settings.mirrored[d][1] && box.upper[d] == lattice.cells()[d] + 1) ++box.upper[d];
   }
   return box;
 }

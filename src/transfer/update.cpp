@@ -16,8 +16,8 @@ MotionRow<Dim> load_motion(const double* motion, int node) {
 }
 
 /// w_p += dt sum N arm x a / sum N arm^2, the transpose of how spin gives momentum to the nodes: energy and angular
-/// momentum go to the points as the nodes have them. `moment[d]` is sum N arm_d (acceleration, velocity); of the rest, 1 - `keep`,
-/// it takes the grid's spin.
+/// momentum go to the points as the nodes have them. `moment[d]` is sum N arm_d (acceleration, velocity); of the rest,
+/// 1 - `keep`, it takes the grid's spin.
 template <int Dim, class Shape>
 void turn_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
                 const MotionRow<Dim> (&moment)[Dim], double dt, double keep) {
@@ -49,8 +49,8 @@ void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim,
       turn_point(piece.points, first + lane, stencil, lane, moment, dt,
                  settings.flip * (1.0 - settings.spin_relaxation));
     } else {
-      stencil.for_nodes(
-          lane, [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
+      stencil.for_nodes(lane,
+                        [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
     }
     for (int d = 0; d < Dim; ++d) {
       double& v = piece.points.column(PointColumns<Dim>::velocity + d)[first + lane];
@@ -73,6 +73,29 @@ void scatter_momentum(const Points<Dim>& points, int first, int count, const Ste
   }
 }
 
+/// x_p += dt sum N v; returns the largest squared speed, infinite where one is not finite.
+template <int Dim, class Shape>
+double move(Points<Dim>& points, int first, int count, const Stencil<Dim, Shape>& stencil, const double* motion,
+            double dt, double fastest) {
+  using C = PointColumns<Dim>;
+  using M = NodeMotion<Dim>;
+  constexpr double largest_number = std::numeric_limits<double>::max();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  for (int lane = 0; lane < count; ++lane) {
+    MotionRow<Dim> sum{};
+    stencil.for_nodes(lane,
+                      [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
+    double squared = 0;
+    for (int d = 0; d < Dim; ++d) {
+      points.column(d)[first + lane] += dt * sum[M::velocity + d];
+      const double v = points.column(C::velocity + d)[first + lane];
+      squared += v * v;
+    }
+    fastest = squared <= largest_number ? std::max(fastest, squared) : infinity;
+  }
+  return fastest;
+}
+
 /// Calls f(first, count, stencil) for every eight points of the piece on its whole node box.
 template <int Dim, class F>
 void for_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, F&& f) {
@@ -89,19 +112,20 @@ void for_moving_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
 }  // namespace
 
 template <int Dim>
-void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                   const Law& law, double density, double dt, SpeedLimits& speeds) {
-  double fastest = speeds.wave * speeds.wave;
+void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                            const Law& law, double density, double strain_dt, double dt, SpeedLimits& speeds) {
+  double fastest_wave = speeds.wave * speeds.wave, fastest_point = speeds.point * speeds.point;
   std::visit(
       [&](const auto& any) {
-        const auto& concrete = law_of_step(any, dt);
+        const auto& concrete = law_of_step(any, strain_dt);
         for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-          const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
-          fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
+          const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), strain_dt);
+          fastest_wave = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest_wave);
+          fastest_point = move(piece.points, first, count, stencil, piece.nodes.motion.data(), dt, fastest_point);
         });
       },
       law);
-  speeds.wave = std::sqrt(fastest);
+  speeds = {std::sqrt(fastest_wave), std::sqrt(fastest_point)};
 }
 
 template <int Dim>
@@ -131,6 +155,17 @@ void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSe
 }
 
 template <int Dim>
+void accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                         double dt, SpeedLimits& speeds) {
+  double fastest = speeds.point * speeds.point;
+  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+    gather_velocity(piece, first, count, stencil, dt, settings);
+    fastest = move(piece.points, first, count, stencil, piece.nodes.motion.data(), dt, fastest);
+  });
+  speeds.point = std::sqrt(fastest);
+}
+
+template <int Dim>
 void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                       double density) {
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
@@ -147,33 +182,6 @@ void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
     gather_velocity(piece, first, count, stencil, dt, settings);
     scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
   });
-}
-
-template <int Dim>
-void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt,
-          SpeedLimits& speeds) {
-  using C = PointColumns<Dim>;
-  using M = NodeMotion<Dim>;
-  Points<Dim>& points = piece.points;
-  constexpr double largest_number = std::numeric_limits<double>::max();
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  double fastest = speeds.point * speeds.point;
-  for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    for (int lane = 0; lane < count; ++lane) {
-      MotionRow<Dim> sum{};
-      stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) {
-        sum += load_motion<Dim>(piece.nodes.motion.data(), node) * w;
-      });
-      double squared = 0;
-      for (int d = 0; d < Dim; ++d) {
-        points.column(d)[first + lane] += dt * sum[M::velocity + d];
-        const double v = points.column(C::velocity + d)[first + lane];
-        squared += v * v;
-      }
-      fastest = squared <= largest_number ? std::max(fastest, squared) : infinity;
-    }
-  });
-  speeds.point = std::sqrt(fastest);
 }
 
 template <int Dim>
@@ -234,13 +242,14 @@ template <int Dim>
 std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>& piece, const Lattice<Dim>& lattice,
                                                              const TransferSettings<Dim>& settings) {
   std::vector<std::array<double, spin_size<Dim>>> inertia(piece.points.size());
-  for_moving_piece(piece, lattice, settings, [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
-    if constexpr (Stencil<Dim, Shape>::spinning)
-      for (int lane = 0; lane < count; ++lane)
-        for_spins<Dim>([&](int s, int i, int j) {
-          inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
-        });
-  });
+  for_moving_piece(piece, lattice, settings,
+                   [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
+                     if constexpr (Stencil<Dim, Shape>::spinning)
+                       for (int lane = 0; lane < count; ++lane)
+                         for_spins<Dim>([&](int s, int i, int j) {
+                           inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
+                         });
+                   });
   return inertia;
 }
 
@@ -254,15 +263,16 @@ void velocity_from_motion(Piece<Dim>& piece) {
 }
 
 #define CAIRN_INSTANTIATE(Dim)                                                                                      \
-  template void update_stress(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, double,   \
-                              double, SpeedLimits&);                                                                \
+  template void update_stress_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,  \
+                                       double, double, double, SpeedLimits&);                                       \
   template void update_stress_and_force(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, \
                                         double, double, SpeedLimits&);                                              \
   template void accelerate(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);                 \
   template void project_momentum(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);           \
   template void accelerate_and_project(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double,      \
                                        double);                                                                     \
-  template void move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, SpeedLimits&);         \
+  template void accelerate_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double,         \
+                                    SpeedLimits&);                                                                  \
   template void integrate(Piece<Dim>&, double);                                                                     \
   template void velocity_from_sums(Piece<Dim>&);                                                                    \
   template void velocity_from_momentum(Piece<Dim>&);                                                                \

@@ -98,7 +98,8 @@ def full_at(kind: str, cairn: Program, scratch: Path, ranks: int) -> list[str]:
         started = kind in ("history", "bodies")
         full = settings | ({"time.steps": 400, "output.checkpoint": "{}"} if started else {})
         if started:
-            first = cairn("run", CASE, "--out", out, *sets(settings | {"time.steps": 20}), ranks=ranks, timeout=PATIENCE)
+            start = settings | {"time.steps": 20}
+            first = cairn("run", CASE, "--out", out, *sets(start), ranks=ranks, timeout=PATIENCE)
             if first.code != 0:
                 problems.append(f"the start: {first.code} {first.err}")
         disk.leave_free(room)

@@ -134,16 +134,16 @@ void add_kernels() {
       plain("project", [](W& w, P& p) { project(p, w.lattice, w.settings, density); });
       plain("accelerate_and_project",
             [](W& w, P& p) { accelerate_and_project(p, w.lattice, w.settings, density, dt); });
-      plain("move", [](W& w, P& p) {
+      plain("accelerate_and_move", [](W& w, P& p) {
         SpeedLimits speeds;
-        move(p, w.lattice, w.settings, dt, speeds);
+        accelerate_and_move(p, w.lattice, w.settings, 0, speeds);
       });
       for (const char* law : {"neo_hookean", "von_mises"}) {
         add<Dim>(
-            "update_stress", shape, law, size,
+            "update_stress_and_move", shape, law, size,
             [](W& w, P& p) {
               SpeedLimits speeds;
-              update_stress(p, w.lattice, w.settings, w.law, density, dt, speeds);
+              update_stress_and_move(p, w.lattice, w.settings, w.law, density, dt, 0, speeds);
             },
             true);
         add<Dim>(

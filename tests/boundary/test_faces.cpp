@@ -62,8 +62,7 @@ struct Stepper {
     accelerate_and_project(piece(), lattice, settings, density, dt);
     mirror_vectors(patch, lattice, faces, &NodeBox<Dim>::velocity);
     velocity_from_momentum(piece());
-    update_stress(piece(), lattice, settings, law, density, dt / 2, speeds);
-    move(piece(), lattice, settings, dt, speeds);
+    update_stress_and_move(piece(), lattice, settings, law, density, dt / 2, dt, speeds);
   }
 };
 

@@ -59,8 +59,12 @@ Vec<Dim> turning(const Vec3& spin, const Vec<Dim>& arm) {
 /// A random state at x: stress of the order of `stress` [Pa].
 template <int Dim>
 PointState<Dim> random_point(Random& random, const Vec<Dim>& x, double stress) {
-  return {x, random.vector<Dim>(2), Mat3::Identity() + random_matrix<Dim>(random, 0.15),
-          random_symmetric<Dim>(random, stress), random(1e-3, 2e-3), Vec3(random(-3, 3), random(-3, 3), random(-3, 3))};
+  return {x,
+          random.vector<Dim>(2),
+          Mat3::Identity() + random_matrix<Dim>(random, 0.15),
+          random_symmetric<Dim>(random, stress),
+          random(1e-3, 2e-3),
+          Vec3(random(-3, 3), random(-3, 3), random(-3, 3))};
 }
 
 /// `count` random points between two corners given in cells.

@@ -109,10 +109,9 @@ class Simulation {
   void contact_before_update();
   void strain_first(double share);  // (*)
   void contact_after_update(bool last);
-  void accelerate_points(bool again);
+  void accelerate_points();
   void project_again();  // (*)
-  void strain_last(double share);
-  void move_points();
+  void finish_points(double share);
   void migrate_points();  // (*)
 
   void place_points(const Case& c);

@@ -27,7 +27,8 @@ struct TransferSettings {
   // moving points: without it a disk gains 10 % of its energy in 30 turns. Colliding disks lose 0.1 % by it.
   double spin_relaxation = 1e-3;
   NormalSettings normals;
-  bool extras = false;  // stress and position sums are needed
+  std::array<std::array<bool, 2>, Dim> mirrored{};  // sides that are symmetry planes
+  bool extras = false;                              // stress and position sums are needed
   bool normals_needed = true;
 
   static TransferSettings make(const SolverOptions& solver, const ContactOptions& contact, const Vec<Dim>& gravity);
@@ -47,12 +48,14 @@ void lay_out_nodes(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfe
 template <int Dim>
 void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density);
 
-/// nodes -> points: strain over `dt` from the nodal velocity, deformation gradient and stress; raises `speeds.wave`.
+/// nodes -> points: strain over `strain_dt` from the nodal velocity, deformation gradient and stress; then
+/// x_p += dt sum N v with the velocity of the motion (eq. 10). Raises `speeds`.
 template <int Dim>
-void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                   const Law& law, double density, double dt, SpeedLimits& speeds);
+void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                            const Law& law, double density, double strain_dt, double dt, SpeedLimits& speeds);
 
-/// As update_stress, and points -> nodes: the force of the new stress, in the same pass.
+/// nodes -> points: strain over `dt`, deformation gradient and stress; points -> nodes: the force of the new stress, in
+/// the same pass. Raises `speeds.wave`.
 template <int Dim>
 void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                              const Law& law, double density, double dt, SpeedLimits& speeds);
@@ -66,20 +69,20 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
 template <int Dim>
 void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt);
 
+/// As accelerate, then x_p += dt sum N v (eq. 10), in the same pass; raises `speeds.point`.
+template <int Dim>
+void accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                         double dt, SpeedLimits& speeds);
+
 /// points -> nodes: momentum alone, at the positions of the last projection, into NodeBox::velocity [kg m/s].
 template <int Dim>
 void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                       double density);
 
-/// Both of these in one pass.
+/// accelerate and project_momentum in one pass.
 template <int Dim>
 void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                             double density, double dt);
-
-/// nodes -> points: x_p += dt sum N v (eq. 10); raises `speeds.point`.
-template <int Dim>
-void move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt,
-          SpeedLimits& speeds);
 
 /// nodes: NodeMotion from sums and force: a = f/m, v = p/m + dt a (eq. 9).
 template <int Dim>
