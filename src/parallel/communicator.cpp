@@ -17,18 +17,21 @@ NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours)
     : comm_(comm),
       neighbours_(std::move(neighbours)),
       outgoing_(neighbours_.size() + 1),
-      incoming_(neighbours_.size()) {
+      incoming_(neighbours_.size() + 1) {
   MPI_Comm_rank(comm_, &rank_);
 }
 
 NeighbourExchange::~NeighbourExchange() {
-  // On the way out of an error of this rank alone nobody may be there to receive what was sent.
-  int sent = 1;
-  MPI_Testall(static_cast<int>(requests_.size()), requests_.data(), &sent, MPI_STATUSES_IGNORE);
-  if (!sent && std::uncaught_exceptions() > 0)
-    new std::vector<Message>(std::move(outgoing_));  // kept for MPI to the end
-  else
+  if (std::uncaught_exceptions() == 0) {
     wait();
+    return;
+  }
+  // On the way out of an error of this rank alone nobody may be there to receive what was sent.
+  constexpr double patience = 1;  // [s]
+  int sent = 0;
+  for (const double start = MPI_Wtime(); !sent && MPI_Wtime() - start < patience;)
+    MPI_Testall(static_cast<int>(requests_.size()), requests_.data(), &sent, MPI_STATUSES_IGNORE);
+  if (!sent) new std::vector<Message>(std::move(outgoing_));  // kept for MPI to the end
 }
 
 std::size_t NeighbourExchange::slot(int rank) const {
@@ -71,6 +74,7 @@ void NeighbourExchange::finish() {
     incoming_[i].words().resize(static_cast<std::size_t>(count));
     MPI_Mrecv(incoming_[i].words().data(), count, MPI_DOUBLE, &handle, MPI_STATUS_IGNORE);
   }
+  std::swap(incoming_.back(), outgoing_.back());
 }
 
 }  // namespace cairn

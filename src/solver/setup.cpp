@@ -282,11 +282,13 @@ void Simulation<Dim>::place_points(const Case& c) {
     if (owner_[id] == rank_) filler.fill(*patch++, first_id);
   connect_patches();
 
-  for_pieces([&](Piece<Dim>& piece) {
-    for (int p = 0; p < piece.points.size(); ++p) {
-      double squared = 0;
-      for (int d = 0; d < Dim; ++d) squared += std::pow(piece.points.column(PointColumns<Dim>::velocity + d)[p], 2);
-      speeds_.point = std::max(speeds_.point, std::sqrt(squared));
+  for_patches([&](std::size_t, Patch<Dim>& patch) {
+    for (const auto& piece : patch.pieces) {
+      for (int p = 0; p < piece.points.size(); ++p) {
+        double squared = 0;
+        for (int d = 0; d < Dim; ++d) squared += std::pow(piece.points.column(PointColumns<Dim>::velocity + d)[p], 2);
+        speeds_.point = std::max(speeds_.point, std::sqrt(squared));
+      }
     }
   });
   start_speed_reduction();

@@ -19,18 +19,39 @@ constexpr std::int64_t sort_interval = 50;
 
 template <int Dim>
 void Simulation<Dim>::step(double longest) {
+  using P = Patch<Dim>;
   const StressUpdate update = solver_.stress_update;
   const bool first = update == StressUpdate::first || update == StressUpdate::both;
   const bool again = update == StressUpdate::both || update == StressUpdate::modified_last;
   const double share = update == StressUpdate::both ? 0.5 : 1.0;
 
   choose_time_step(longest);
-  project_points();
-  contact_before_update();
-  if (first) strain_first(share);
-  contact_after_update(!again);
-  if (again) accelerate_points(), project_again();
-  finish_points(share);
+  exchange_->begin_sums(patches_, transfer_.extras);
+  exchange_after([&](std::size_t, P& patch) { project_points(patch); });
+  if (first) {
+    exchange_->begin(&NodeBox<Dim>::force);
+    exchange_after([&](std::size_t p, P& patch) {
+      contact_before_update(p, patch);
+      strain_first(patch, share);
+    });
+    look_for_fault(2);
+  }
+  const auto update_momentum = [&](std::size_t p, P& patch) {
+    first ? complete_forces(p, patch) : contact_before_update(p, patch);
+    contact_after_update(p, patch, !again);
+  };
+  if (again) {
+    exchange_->begin(&NodeBox<Dim>::velocity);
+    exchange_after([&](std::size_t p, P& patch) {
+      update_momentum(p, patch);
+      accelerate_points(patch);
+    });
+  }
+  for_patches([&](std::size_t p, P& patch) {
+    again ? project_again(p, patch) : update_momentum(p, patch);
+    finish_points(patch, share);
+  });
+  look_for_fault(1);
   migrate_points();
   time_ += dt_;
   ++steps_;
@@ -49,122 +70,106 @@ void Simulation<Dim>::choose_time_step(double longest) {
 }
 
 template <int Dim>
-void Simulation<Dim>::project_points() {
-  {
-    const auto time = timers_.measure(Stage::project);
-    for_pieces([&](Piece<Dim>& piece) { lay_out_nodes(piece, lattice_, transfer_); });
+void Simulation<Dim>::project_points(Patch<Dim>& patch) {
+  const auto time = timers_.measure(Stage::project);
+  for (auto& piece : patch.pieces) {
+    lay_out_nodes(piece, lattice_, transfer_);
+    project(piece, lattice_, transfer_, material_of(piece).density);
   }
-  const auto project_where = [&](bool shared) {
-    const auto time = timers_.measure(Stage::project);
-    for_patches([&](std::size_t, Patch<Dim>& patch) {
-      for (auto& piece : patch.pieces)
-        if (NodeExchange<Dim>::shares_nodes(patch, piece) == shared)
-          project(piece, lattice_, transfer_, material_of(piece).density);
-    });
-  };
-  project_where(true);
+}
+
+template <int Dim>
+void Simulation<Dim>::contact_before_update(std::size_t p, Patch<Dim>& patch) {
   {
     const auto time = timers_.measure(Stage::exchange);
-    exchange_->start_sums(patches_, transfer_.extras);
+    exchange_->add(patch, p);
+    mirror_sums(patch, lattice_, faces_);
   }
-  project_where(false);
-  const auto time = timers_.measure(Stage::exchange);
-  exchange_->finish_sums(patches_);
-  for (auto& patch : patches_) mirror_sums(patch, lattice_, faces_);
-}
-
-template <int Dim>
-void Simulation<Dim>::contact_before_update() {
   const auto time = timers_.measure(Stage::contact);
-  for_patches([&](std::size_t p, Patch<Dim>& patch) {
-    sweeps_[p].find(patch, lattice_, contact_, bodies_);
-    walls_[p].find(patch, lattice_, faces_, contact_, sweeps_[p], bodies_);
-    sweeps_[p].first_pass(patch, lattice_, contact_, dt_);
-    walls_[p].first_pass(patch, faces_, contact_, dt_);
-  });
+  sweeps_[p].find(patch, lattice_, contact_, bodies_);
+  walls_[p].find(patch, lattice_, faces_, contact_, sweeps_[p], bodies_);
+  sweeps_[p].first_pass(patch, lattice_, contact_, dt_);
+  walls_[p].first_pass(patch, faces_, contact_, dt_);
 }
 
 template <int Dim>
-void Simulation<Dim>::strain_first(double share) {
-  {
-    const auto time = timers_.measure(Stage::stress);
-    for_patches([&](std::size_t, Patch<Dim>& patch) {
-      for (auto& piece : patch.pieces) velocity_from_sums(piece);
-      constrain_velocity(patch, lattice_, faces_, bodies_, false);
-      for (auto& piece : patch.pieces) {
-        const auto& material = material_of(piece);
-        if (is_rigid(piece))
-          std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
-        else
-          update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
-      }
-    });
+void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
+  const auto time = timers_.measure(Stage::stress);
+  for (auto& piece : patch.pieces) velocity_from_sums(piece);
+  constrain_velocity(patch, lattice_, faces_, bodies_, false);
+  for (auto& piece : patch.pieces) {
+    const auto& material = material_of(piece);
+    if (is_rigid(piece))
+      std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
+    else
+      update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
   }
-  look_for_fault(3);
-  const auto time = timers_.measure(Stage::exchange);
-  exchange_->sum(patches_, &NodeBox<Dim>::force);
-  for (auto& patch : patches_) mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::force);
 }
 
 template <int Dim>
-void Simulation<Dim>::contact_after_update(bool last) {
+void Simulation<Dim>::complete_forces(std::size_t p, Patch<Dim>& patch) {
+  const auto time = timers_.measure(Stage::exchange);
+  exchange_->add(patch, p);
+  mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::force);
+}
+
+template <int Dim>
+void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, bool last) {
   {
     const auto time = timers_.measure(Stage::contact);
-    for_patches([&](std::size_t p, Patch<Dim>& patch) {
-      sweeps_[p].second_pass(patch, lattice_, contact_, dt_, last);
-      walls_[p].second_pass(patch, faces_, contact_, dt_, last);
-    });
+    sweeps_[p].second_pass(patch, lattice_, contact_, dt_, last);
+    walls_[p].second_pass(patch, faces_, contact_, dt_, last);
   }
   const auto time = timers_.measure(Stage::integrate);
-  for_pieces([&](Piece<Dim>& piece) { integrate(piece, dt_); });
-  for (auto& patch : patches_) constrain_motion(patch, lattice_, faces_, bodies_, dt_, last);
+  for (auto& piece : patch.pieces) integrate(piece, dt_);
+  constrain_motion(patch, lattice_, faces_, bodies_, dt_, last);
 }
 
 template <int Dim>
-void Simulation<Dim>::accelerate_points() {
+void Simulation<Dim>::accelerate_points(Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::update);
-  for_pieces([&](Piece<Dim>& piece) {
+  for (auto& piece : patch.pieces) {
     const double density = material_of(piece).density;
     if (is_rigid(piece))
       project_momentum(piece, lattice_, transfer_, density);
     else
       accelerate_and_project(piece, lattice_, transfer_, density, dt_);
-  });
+  }
 }
 
 template <int Dim>
-void Simulation<Dim>::project_again() {
+void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
   {
     const auto time = timers_.measure(Stage::exchange);
-    exchange_->sum(patches_, &NodeBox<Dim>::velocity);
-    for (auto& patch : patches_) mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::velocity);
+    exchange_->add(patch, p);
+    mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::velocity);
   }
   const auto time = timers_.measure(Stage::contact);
-  for_patches([&](std::size_t p, Patch<Dim>& patch) {
-    sweeps_[p].repeat_pass(patch, lattice_, contact_, dt_);
-    walls_[p].repeat_pass(patch, faces_, contact_, dt_);
-  });
-  for_pieces([&](Piece<Dim>& piece) { velocity_from_momentum(piece); });
-  for (auto& patch : patches_) constrain_velocity(patch, lattice_, faces_, bodies_, true);
-  for_pieces([&](Piece<Dim>& piece) { centre_motion(piece); });
+  sweeps_[p].repeat_pass(patch, lattice_, contact_, dt_);
+  walls_[p].repeat_pass(patch, faces_, contact_, dt_);
+  for (auto& piece : patch.pieces) velocity_from_momentum(piece);
+  constrain_velocity(patch, lattice_, faces_, bodies_, true);
+  for (auto& piece : patch.pieces) centre_motion(piece);
 }
 
 /// The last pass over the points: what is left to do with them, and they move.
 template <int Dim>
-void Simulation<Dim>::finish_points(double share) {
+void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
   const auto time = timers_.measure(solver_.stress_update == StressUpdate::first ? Stage::update : Stage::stress);
-  for_pieces([&](Piece<Dim>& piece) {
+  for (auto& piece : patch.pieces) {
     const auto& material = material_of(piece);
-    if (is_rigid(piece)) return move_rigid(piece);
-    if (solver_.stress_update == StressUpdate::first)
-      return accelerate_and_move(piece, lattice_, transfer_, dt_, speeds_);
-    if (solver_.stress_update == StressUpdate::last) {
-      accelerate(piece, lattice_, transfer_, dt_);
-      velocity_from_motion(piece);
+    if (is_rigid(piece)) {
+      move_rigid(piece);
+    } else if (solver_.stress_update == StressUpdate::first) {
+      accelerate_and_move(piece, lattice_, transfer_, dt_, speeds_);
+    } else {
+      if (solver_.stress_update == StressUpdate::last) {
+        accelerate(piece, lattice_, transfer_, dt_);
+        velocity_from_motion(piece);
+      }
+      update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
     }
-    update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
-  });
-  look_for_fault(1);
+  }
 }
 
 /// Points of a rigid body turn about its centre, which moves with the body's velocity.
@@ -249,6 +254,8 @@ void Simulation<Dim>::connect_patches() {
   messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
   messages_->traffic() = traffic;
   exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_);
+  beside_others_.clear();
+  for (const auto& patch : patches_) beside_others_.push_back(exchange_->beside_others(patch));
   migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_);
 }
 

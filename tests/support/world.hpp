@@ -111,13 +111,23 @@ struct World {
   void sum_points() {
     for_pieces([&](auto& piece) { lay_out_nodes(piece, lattice, settings); });
     for_pieces([&](auto& piece) { project(piece, lattice, settings, density); });
-    exchange->start_sums(patches, true);
-    exchange->finish_sums(patches);
+    exchange->begin_sums(patches, true);
+    sum();
   }
   /// Momentum once more, by the exchange of one array.
   void sum_momentum() {
     for_pieces([&](auto& piece) { project_momentum(piece, lattice, settings, density); });
-    exchange->sum(patches, &NodeBox<Dim>::velocity);
+    exchange->begin(&NodeBox<Dim>::velocity);
+    sum();
+  }
+  void sum() {
+    for (bool beside_others : {true, false}) {
+      for (std::size_t p = 0; p < patches.size(); ++p)
+        if (exchange->beside_others(patches[p]) == beside_others) exchange->put(patches[p], p);
+      if (beside_others) exchange->start();
+    }
+    exchange->finish();
+    for (std::size_t p = 0; p < patches.size(); ++p) exchange->add(patches[p], p);
   }
 };
 

@@ -50,9 +50,8 @@ class NeighbourExchange {
 
   /// The message for a rank (a neighbour or this rank), emptied by `begin`.
   Message& outgoing(int rank) { return outgoing_[slot(rank)]; }
-  const Message& incoming(int rank) const {
-    return slot(rank) == neighbours_.size() ? outgoing_.back() : incoming_[slot(rank)];
-  }
+  /// What the last `finish` received; it stays while the next messages are written.
+  const Message& incoming(int rank) const { return incoming_[slot(rank)]; }
   const std::vector<int>& neighbours() const { return neighbours_; }
   int rank() const { return rank_; }
   Traffic& traffic() { return traffic_; }
@@ -71,7 +70,7 @@ class NeighbourExchange {
   MPI_Comm comm_;
   int rank_ = 0;
   std::vector<int> neighbours_;
-  std::vector<Message> outgoing_, incoming_;  // by neighbour; outgoing_ has this rank's own at the end
+  std::vector<Message> outgoing_, incoming_;  // by neighbour, and this rank's own at the end
   std::vector<MPI_Request> requests_;
   Traffic traffic_;
 };

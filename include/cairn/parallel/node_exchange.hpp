@@ -7,6 +7,8 @@
 /// patch's own included, so that every patch finds the same bits, wherever patches live. All messages between two ranks
 /// travel as one. Afterwards a patch holds complete sums on all nodes that its points touch.
 
+#include <span>
+
 #include "cairn/body/patch.hpp"
 #include "cairn/parallel/communicator.hpp"
 
@@ -19,22 +21,27 @@ struct NodeQuantity {
   int width, used;
 };
 
+/// An exchange: `begin`, `put` for every patch that lies beside other ranks, `start`, `put` for the rest while the
+/// messages travel, `finish`, and `add` for every patch, which may come after the `begin` of the next exchange but
+/// before the same patch's `put`. Patches are named by their position among the rank's.
 template <int Dim>
 class NodeExchange {
  public:
   /// \param owner  the rank of every patch; must outlive this object unchanged
   NodeExchange(NeighbourExchange& messages, const std::vector<int>& owner) : messages_(messages), owner_(owner) {}
 
-  /// True where the piece touches nodes that a neighbour shares: such pieces must be projected before `start_sums`.
-  static bool shares_nodes(const Patch<Dim>& patch, const Piece<Dim>& piece);
+  /// True where a neighbour of the patch lives on another rank.
+  bool beside_others(const Patch<Dim>& patch) const;
 
-  /// Sends the sums, forces (and extras) of shared nodes, with the boxes they cover.
-  void start_sums(std::vector<Patch<Dim>>& patches, bool extras);
-  /// Receives and adds them; node boxes grow to hold what arrives, ghost pieces come and go.
-  void finish_sums(std::vector<Patch<Dim>>& patches);
-
-  /// Sums one more array (forces of a new stress, momenta projected again) over the same nodes.
-  void sum(std::vector<Patch<Dim>>& patches, AlignedDoubles NodeBox<Dim>::*values);
+  /// For the sums, forces (and extras) of shared nodes, with the boxes they cover: `add` makes node boxes grow to hold
+  /// what arrives, and ghost pieces come and go.
+  void begin_sums(const std::vector<Patch<Dim>>& patches, bool extras);
+  /// For one more array (forces of a new stress, momenta projected again) over the same nodes, put in the same order.
+  void begin(AlignedDoubles NodeBox<Dim>::*values);
+  void put(Patch<Dim>& patch, std::size_t p);
+  void start() { messages_.start(); }
+  void finish();
+  void add(Patch<Dim>& patch, std::size_t p);
 
  private:
   /// What one patch got from one neighbour for one body.
@@ -42,25 +49,28 @@ class NodeExchange {
     int link, body;
     Box<Dim> box;  // in the receiver's frame
     int rank;
-    std::size_t at;  // first number in the message
+    std::size_t at, nodes_before;  // first number in the message of the sums; nodes before it in the message
   };
   struct Sent {
-    int patch, piece_body;  // position among the patches, body
-    Box<Dim> box;           // in the sender's frame
+    int body;
+    Box<Dim> box;  // in the sender's frame
     int rank;
   };
-  using Quantities = std::vector<NodeQuantity<Dim>>;
+  struct Content {
+    std::vector<NodeQuantity<Dim>> quantities;
+    bool with_boxes = false;  // it is that of the sums
+  };
 
+  void put_with_boxes(Patch<Dim>& patch, std::size_t p);
   void parse(int rank);
-  void add_parts(Patch<Dim>& patch, std::vector<Part>& parts);
-  void add_to_piece(Piece<Dim>& piece, int links_before, const Part* begin, const Part* end,
-                    const Quantities& quantities, bool grow);
-  void add_part(NodeBox<Dim>& nodes, const Part& part, const Quantities& quantities) const;
+  void renew_ghosts(Patch<Dim>& patch, std::vector<Part>& parts) const;
+  void add_to_piece(Piece<Dim>& piece, int links_before, std::span<const Part> parts) const;
+  void add_part(NodeBox<Dim>& nodes, const Part& part) const;
 
   NeighbourExchange& messages_;
   const std::vector<int>& owner_;
-  Quantities quantities_;                 // of start_sums
-  std::vector<Sent> sent_;                // in the order of packing
+  Content out_, in_;                      // of what is put, and of what is added
+  std::vector<std::vector<Sent>> sent_;   // for each patch, in the order of packing
   std::vector<std::vector<Part>> parts_;  // for each patch, ordered by (body, link)
   std::vector<int> position_;             // of each local patch by id, else -1
 };

@@ -103,16 +103,18 @@ class Simulation {
   bool is_rigid(const Piece<Dim>& piece) const { return bodies_[piece.body].rigid; }
 
  private:
-  // The stages of a step, in order. Those marked (*) communicate.
+  // The stages of a step, in order. All but the first and the last are those of one patch, the p-th of this rank;
+  // (*) begins with the sums over patches that the exchange before it brought.
   void choose_time_step(double longest);
-  void project_points();  // (*)
-  void contact_before_update();
-  void strain_first(double share);  // (*)
-  void contact_after_update(bool last);
-  void accelerate_points();
-  void project_again();  // (*)
-  void finish_points(double share);
-  void migrate_points();  // (*)
+  void project_points(Patch<Dim>& patch);
+  void contact_before_update(std::size_t p, Patch<Dim>& patch);  // (*)
+  void strain_first(Patch<Dim>& patch, double share);
+  void complete_forces(std::size_t p, Patch<Dim>& patch);  // (*)
+  void contact_after_update(std::size_t p, Patch<Dim>& patch, bool last);
+  void accelerate_points(Patch<Dim>& patch);
+  void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
+  void finish_points(Patch<Dim>& patch, double share);
+  void migrate_points();  // communicates
 
   void place_points(const Case& c);
   void restore(const Checkpoint& from);
@@ -120,24 +122,32 @@ class Simulation {
   void connect_patches();                                      // after patches came or went
   void balance();                                              // (*)
 
-  /// Calls f(position, patch) for every patch that is not empty and notes the processor time that it takes.
+  /// Calls f(position, patch) for every patch and notes the processor time that it takes.
   template <class F>
   void for_patches(F&& f) {
-    for (std::size_t p = 0; p < patches_.size(); ++p) {
-      if (patches_[p].pieces.empty()) {
-        patches_[p].ledger.contact_nodes = 0;
-        continue;
-      }
-      const double start = processor_seconds();
-      f(p, patches_[p]);
-      patches_[p].seconds += processor_seconds() - start;
-    }
+    for (std::size_t p = 0; p < patches_.size(); ++p) timed(p, f);
   }
   template <class F>
-  void for_pieces(F&& f) {
-    for_patches([&](std::size_t, Patch<Dim>& patch) {
-      for (auto& piece : patch.pieces) f(piece);
-    });
+  void timed(std::size_t p, F&& f) {
+    const bool empty = patches_[p].pieces.empty();
+    const double start = empty ? 0.0 : processor_seconds();
+    f(p, patches_[p]);
+    if (!empty) patches_[p].seconds += processor_seconds() - start;
+  }
+  /// Computes every patch, and exchanges what it shares with its neighbours. Patches beside other ranks go first: their
+  /// messages travel while the rest is computed.
+  template <class F>
+  void exchange_after(F&& compute) {
+    for (const bool beside_others : {true, false}) {
+      for (std::size_t p = 0; p < patches_.size(); ++p) {
+        if (beside_others_[p] != beside_others) continue;
+        timed(p, compute);
+        const auto time = timers_.measure(Stage::exchange);
+        exchange_->put(patches_[p], p);
+      }
+      const auto time = timers_.measure(Stage::exchange);
+      beside_others ? exchange_->start() : exchange_->finish();
+    }
   }
   void move_rigid(Piece<Dim>& piece);
   void look_for_fault(int urgency);
@@ -157,6 +167,7 @@ class Simulation {
   std::vector<Body> bodies_;
   std::vector<Patch<Dim>> patches_;
   std::vector<int> owner_;
+  std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
   std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
   std::vector<WallContact<Dim>> walls_;
   std::unique_ptr<NeighbourExchange> messages_;

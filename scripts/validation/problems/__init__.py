@@ -1,0 +1,12 @@
+"""The problems of the suite, one module each, in the order of the table."""
+
+from __future__ import annotations
+
+import importlib
+
+NAMES = ("block", "disk", "sphere", "backspin", "disks", "bars", "hertz", "cylinder", "collinear", "zigzag", "waves",
+         "rotation", "grains")
+
+
+def load(names: list[str]) -> list:
+    return [importlib.import_module(f"validation.problems.{name}").PROBLEM for name in names]

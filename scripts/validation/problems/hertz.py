@@ -1,0 +1,135 @@
+"""An elastic sphere, pressed slowly by a plate and hitting a wall, against Hertz."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from validation.checks import Check, holds, record
+from validation.closed_forms import HertzSphere, plane_strain_modulus, swing_time
+from validation.figures import Curve, Panel, draw_panels
+from validation.problems import pressing
+from validation.problems.pressing import RADIUS, SPEED
+from validation.runs import Run
+from validation.series import motion
+from validation.suite import Folders, Problem
+
+CELLS = (8, 16, 32)  # to a radius
+HERTZ = HertzSphere(RADIUS, plane_strain_modulus(pressing.YOUNGS, pressing.POISSON))
+STAND_OFF = "stand-off that makes up for it [cells]"  # bodies hold from up to half a cell away
+MASS, IMPACT_SPEED = 4 / 3 * math.pi * RADIUS**3, 0.0116  # [kg], [m/s]
+
+
+def press(cells: int) -> Run:
+    cell = RADIUS / cells
+    # The plate ends 4 % of the radius below the top of the sphere, whatever the gap.
+    return Run("validation/sphere_press", {
+        "domain.cell_size": cell, "bodies.1.shape.lower": [0.0, RADIUS + cell / 2, 0.0],
+        "time.end": (0.04 * RADIUS + cell / 2) / SPEED, "output.particles.interval": 4.0}, 0.0001 * cells**4)
+
+
+def impact(cells: int) -> Run:
+    cell = RADIUS / cells
+    end = cell / 2 / IMPACT_SPEED + 1.3 * HERTZ.impact_time(MASS, IMPACT_SPEED)
+    return Run("validation/sphere_impact", {
+        "domain.cell_size": cell, "bodies.0.shape.centre": [0.0, RADIUS + cell / 2, 0.0], "time.end": end},
+        0.00012 * cells**4)
+
+
+def runs(full: bool) -> dict[str, Run]:
+    cells = CELLS if full else CELLS[:2]
+    return {f"press, R/{count}": press(count) for count in cells} | {
+        f"impact, R/{count}": impact(count) for count in cells}
+
+
+def pressed(folder: Path, cells: int) -> list[tuple[float, list[tuple[str, float, float | None]]]]:
+    """At each output: the contact's radius after Hertz, and what was measured, with Hertz's value."""
+    found = []
+    for state in pressing.states(folder, RADIUS / cells):
+        if state.depth <= 0:  # held from up to half a cell away
+            continue
+        force = 4 * state.force  # the model is a quarter of the contact
+        radius = HERTZ.contact_radius(force)
+        found.append((radius, [
+            ("force at the approach [N]", force, float(HERTZ.force(state.depth))),
+            (STAND_OFF, (HERTZ.approach(force) - state.depth) * cells / RADIUS, None),
+            ("contact radius a at the force [m]", math.sqrt(2.5 * state.second_moment), radius),
+            ("peak pressure at the force [Pa]", state.peak, HERTZ.peak_pressure(force))]))
+    return found
+
+
+def impact_checks(folders: Folders) -> list[Check]:
+    found, errors = [], []
+    times, velocities = HERTZ.impact(MASS, IMPACT_SPEED)
+    exact = swing_time(times, velocities)
+    for cells in CELLS:
+        case = f"impact, R/{cells}"
+        if case not in folders:
+            continue
+        path = motion(folders[case], 0)
+        start, end = swing_time(path["time"], path["vy"])
+        lasts = (end - start) / (exact[1] - exact[0]) * HERTZ.impact_time(MASS, IMPACT_SPEED)
+        errors.append(abs(lasts / HERTZ.impact_time(MASS, IMPACT_SPEED) - 1))
+        deepest = RADIUS - path["y"].min()
+        across = 2 * math.sqrt(RADIUS * HERTZ.largest_approach(MASS, IMPACT_SPEED)) * cells / RADIUS
+        case = f"{case}, {across:.1f} cells across"
+        found += [record(case, "duration [s]", lasts, HERTZ.impact_time(MASS, IMPACT_SPEED)),
+                  record(case, "largest approach [m]", deepest, HERTZ.largest_approach(MASS, IMPACT_SPEED)),
+                  record(case, "parting/closing speed", path["vy"][-1] / IMPACT_SPEED, 1.0)]
+    if len(errors) > 1:
+        found.append(holds("impact", "error of the duration falls with h", errors[-1] < errors[0]))
+    return found
+
+
+def checks(folders: Folders) -> list[Check]:
+    found, last, series = [], {}, {}
+    for cells in CELLS:
+        if f"press, R/{cells}" not in folders:
+            continue
+        for radius, rows in pressed(folders[f"press, R/{cells}"], cells):
+            new = pressing.compare(f"press, R/{cells}", RADIUS / cells, radius, rows)
+            for check in new:
+                if check.quantity == STAND_OFF:
+                    check.low, check.high = 0.0, 0.5
+            found += new
+            for name, value, expected in rows:
+                if expected is None:
+                    continue
+                series.setdefault(name, []).append((2 * radius * cells / RADIUS, value / expected - 1))
+                last.setdefault(name, {})[cells] = abs(value / expected - 1)
+    for name, errors in last.items():
+        by_size = list(errors.values())
+        if len(by_size) > 1:
+            found.append(holds("press, largest force", f"error falls with h: {name}", by_size[-1] < by_size[0]))
+        found.append(record("press", f"cells across the contact for 10 %: {name}",
+                            pressing.cells_needed(series[name])))
+    return found + impact_checks(folders)
+
+
+def draw(folders: Folders, out: Path) -> list[Path]:
+    depth = np.linspace(0, 0.04, 100)
+    force = [Curve("Hertz", depth, HERTZ.force(depth), "k--")]
+    radius = [Curve("Hertz", HERTZ.force(depth), HERTZ.contact_radius(HERTZ.force(depth)), "k--")]
+    times, velocities = HERTZ.impact(MASS, IMPACT_SPEED)
+    speed = [Curve("Hertz", times, -velocities / IMPACT_SPEED, "k--")]
+    for cells in CELLS:
+        cell = RADIUS / cells
+        if (name := f"press, R/{cells}") in folders:
+            time, values = pressing.force_series(folders[name])
+            force.append(Curve(f"h = R/{cells}", SPEED * time - cell / 2, 4 * values))
+            states = pressing.states(folders[name], cell)
+            radius.append(Curve(f"h = R/{cells}", [4 * state.force for state in states],
+                                [math.sqrt(2.5 * state.second_moment) for state in states], "o-"))
+        if (name := f"impact, R/{cells}") in folders:
+            path = motion(folders[name], 0)
+            speed.append(Curve(f"h = R/{cells}", path["time"] - cell / 2 / IMPACT_SPEED, path["vy"] / IMPACT_SPEED))
+    panels = [Panel("plate on a sphere", "approach [m]", "force [N]", force),
+              Panel("plate on a sphere", "force [N]", "contact radius [m]", radius),
+              Panel("sphere hits a wall", "time [s]", "velocity / impact velocity", speed)]
+    return [draw_panels(out / "hertz.png", "Hertz contact", panels)]
+
+
+PROBLEM = Problem("hertz", "Sphere: plate and impact", "Hertz; Johnson, Contact Mechanics, sections 4.2 and 11.4", runs,
+                  checks, draw)

@@ -1,0 +1,86 @@
+"""A sphere on a deformable incline, against a rigid sphere: rolling without slip, and sliding as it rolls."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from validation.checks import Check, holds
+from validation.closed_forms import Rigid
+from validation.figures import convergence, draw_panels
+from validation.problems import rolling
+from validation.runs import Run
+from validation.series import motion
+from validation.suite import Folders, Problem
+
+RADIUS, GRAVITY, END = 1.6, 10.0, 2.0  # [m], [m/s2], [s]
+SIZE = (20.0, 2.0)  # of the plane along x and z [m]
+CELLS = (2, 4, 8)  # to a radius
+GAPS = ("h/2", "0")  # between sphere and plane at the start
+# Friction, incline [degrees], allowed error of x at 1 and 2 s and of the spin, with 4 cells.
+CASES = {"no slip": (0.495, 45, 0.05, None), "slip": (0.286, 60, 0.03, 0.10)}
+
+
+def label(kind: str, cells: int, gap: str) -> str:
+    return f"{kind}, R/{cells}, gap {gap}"
+
+
+def rigid_sphere(kind: str) -> Rigid:
+    friction, degrees, *_ = CASES[kind]
+    return Rigid(RADIUS, 2 / 5, GRAVITY, math.radians(degrees), friction)
+
+
+def run(kind: str, cells: int, gap: str) -> Run:
+    """The plane is half a radius thick, but at least two cells."""
+    friction, degrees, *_ = CASES[kind]
+    cell, angle = RADIUS / cells, math.radians(degrees)
+    top = max(RADIUS / 2, 2 * cell)
+    height = top + RADIUS + (cell / 2 if gap == "h/2" else 0)
+    upper = [math.ceil(length / cell - 1e-9) * cell for length in (SIZE[0], top + 2 * RADIUS + 1.0, SIZE[1])]
+    return Run("validation/sphere_plane", {
+        "domain.upper": upper, "domain.cell_size": cell, "contact.friction": friction,
+        "domain.gravity": [GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle), 0.0],
+        "bodies.0.shape.upper": [upper[0], top, upper[2]],
+        "bodies.1.shape.centre": [2.4 + 0.37 * cell, height, 0.0]}, 0.02 * cells**4)
+
+
+def runs(full: bool) -> dict[str, Run]:
+    cells, gaps = (CELLS, GAPS) if full else (CELLS[:2], GAPS[:1])
+    return {label(kind, count, gap): run(kind, count, gap) for kind in CASES for count in cells for gap in gaps}
+
+
+def checks(folders: Folders) -> list[Check]:
+    found = []
+    for kind, (_, _, share, spin_share) in CASES.items():
+        rigid = rigid_sphere(kind)
+        for gap in GAPS:
+            errors = {}
+            for cells in CELLS:
+                if (name := label(kind, cells, gap)) not in folders:
+                    continue
+                bands = (share, spin_share) if gap == "h/2" and cells == 4 else (None, None)
+                path = motion(folders[name], 1)
+                found += rolling.checks(name, path, rigid, 1.0, bands[0], None, 0.5)
+                found += rolling.checks(name, path, rigid, END, *bands, END / 2)
+                errors[cells] = abs(found[-2].error)
+            if gap == "h/2" and 8 in errors and 4 in errors:
+                found.append(holds(kind, "x at 2 s better at R/8 than at R/4", errors[8] < errors[4]))
+    return found
+
+
+def draw(folders: Folders, out: Path) -> list[Path]:
+    """Position, velocity and spin (the paper's Figs. 3 to 6), and the error of x against the cells."""
+    groups, errors = {}, {}
+    for kind in CASES:
+        rigid = rigid_sphere(kind)
+        tables = {cells: motion(folders[name], 1) for cells in CELLS if (name := label(kind, cells, "h/2")) in folders}
+        groups[kind] = (rigid, {f"h = R/{cells}": table for cells, table in tables.items()})
+        errors[kind] = ([1 / cells for cells in tables],
+                        [rolling.travelled(table, END) / rigid.distance(END) - 1 for table in tables.values()])
+    panel = convergence("Sphere, x at 2 s", "relative error", errors, "h / R")
+    return [rolling.draw(out / "sphere.png", "Sphere on an inclined plane", groups, END),
+            draw_panels(out / "sphere_convergence.png", "", [panel])]
+
+
+PROBLEM = Problem("sphere", "Sphere on a deformable incline", "Bardenhagen et al. 2001, section 3.1, eqs. 23 and 24",
+                  runs, checks, draw, literal=tuple(label(kind, 4, "h/2") for kind in CASES))
