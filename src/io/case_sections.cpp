@@ -134,6 +134,14 @@ void read_pair(Table table, const std::vector<Material>& materials, ContactOptio
   contact.pairs.push_back(pair);
 }
 
+/// Large patches share fewer nodes; small domains need small ones, so that several ranks have work.
+int default_patch_cells(const Domain& domain, int dimension) {
+  const double large = dimension == 2 ? 64 : 24, small = dimension == 2 ? 32 : 16, enough = 16;
+  double patches = 1;
+  for (int k = 0; k < dimension; ++k) patches *= domain.cells[k] / large;
+  return static_cast<int>(patches >= enough ? large : small);
+}
+
 }  // namespace
 
 void read_domain(Table domain, Domain& d) {
@@ -159,7 +167,7 @@ void read_domain(Table domain, Domain& d) {
       domain.error("periodic", fmt::format("direction {} has {} cells; a periodic direction needs at least 4", "xyz"[k],
                                            d.cells[k]));
   d.gravity = domain.vector("gravity", dim, Vec3::Zero().eval());
-  d.patch_cells = static_cast<int>(domain.integer("patch_cells", dim == 2 ? 32 : 16, 4, 4096));
+  d.patch_cells = static_cast<int>(domain.integer("patch_cells", default_patch_cells(d, dim), 4, 4096));
   domain.finish();
 }
 

@@ -12,6 +12,15 @@
 namespace cairn {
 namespace {
 
+/// Calls f(piece) for every piece of a patch, whose points are fetched a piece ahead.
+template <int Dim, class F>
+void for_pieces(Patch<Dim>& patch, F&& f) {
+  for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
+    if (k + 1 < patch.pieces.size()) patch.pieces[k + 1].points.prefetch();
+    f(patch.pieces[k]);
+  }
+}
+
 /// Points are sorted by cell again after so many steps.
 constexpr std::int64_t sort_interval = 50;
 
@@ -72,10 +81,10 @@ void Simulation<Dim>::choose_time_step(double longest) {
 template <int Dim>
 void Simulation<Dim>::project_points(Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::project);
-  for (auto& piece : patch.pieces) {
+  for_pieces(patch, [&](Piece<Dim>& piece) {
     lay_out_nodes(piece, lattice_, transfer_);
     project(piece, lattice_, transfer_, material_of(piece).density);
-  }
+  });
 }
 
 template <int Dim>
@@ -97,13 +106,13 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
   const auto time = timers_.measure(Stage::stress);
   for (auto& piece : patch.pieces) velocity_from_sums(piece);
   constrain_velocity(patch, lattice_, faces_, bodies_, false);
-  for (auto& piece : patch.pieces) {
+  for_pieces(patch, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
     if (is_rigid(piece))
       std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
     else
       update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
-  }
+  });
 }
 
 template <int Dim>
@@ -128,13 +137,13 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
 template <int Dim>
 void Simulation<Dim>::accelerate_points(Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::update);
-  for (auto& piece : patch.pieces) {
+  for_pieces(patch, [&](Piece<Dim>& piece) {
     const double density = material_of(piece).density;
     if (is_rigid(piece))
       project_momentum(piece, lattice_, transfer_, density);
     else
       accelerate_and_project(piece, lattice_, transfer_, density, dt_);
-  }
+  });
 }
 
 template <int Dim>
@@ -156,7 +165,7 @@ void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
 template <int Dim>
 void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
   const auto time = timers_.measure(solver_.stress_update == StressUpdate::first ? Stage::update : Stage::stress);
-  for (auto& piece : patch.pieces) {
+  for_pieces(patch, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
     if (is_rigid(piece)) {
       move_rigid(piece);
@@ -169,7 +178,7 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
       }
       update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
     }
-  }
+  });
 }
 
 /// Points of a rigid body turn about its centre, which moves with the body's velocity.

@@ -47,6 +47,12 @@ class Points {
   std::vector<Image>& images() { return images_; }
   const std::vector<Image>& images() const { return images_; }
 
+  /// Asks for the columns to come to the cache: there are too many short ones for the processor to foresee.
+  void prefetch() const {
+    constexpr std::size_t line = 64 / sizeof(double);
+    for (std::size_t i = 0; i < data_.size(); i += line) __builtin_prefetch(data_.data() + i, 1, 2);
+  }
+
   /// Changes the number of points; the first min(old, new) are kept, new ones are unset.
   void resize(int size);
   /// Gives back memory beyond what the points need.
