@@ -121,17 +121,25 @@ velocity = {numbers(velocity(generator, dimension))}
     return path
 
 
-def bytes_per_point_step(dimension: int, stress_update: str) -> int:
+def bytes_per_point_step(dimension: int, stress_update: str, spinning: bool) -> int:
     """Bytes of point columns that the passes of a step read and write (the formula of docs/performance.md): what
     crosses the memory bus where the points do not fit into the cache. Nodes are not counted."""
     d, tensor, symmetric, state = dimension, *((5, 4, 3) if dimension == 2 else (9, 6, 0))
+    spin = (1 if dimension == 2 else 3) if spinning else 0
     first = stress_update in ("first", "both")
     again = stress_update in ("both", "modified_last")
-    updates = 2 if stress_update == "both" else 1
+    strain = 2 * (tensor + symmetric + state)  # F sigma state, read and written
     words = d  # extent of the piece: x
-    words += 2 * d + tensor + symmetric + 1  # projection: x v F sigma V
-    words += updates * (d + 2 * (tensor + symmetric + state)) + first  # stress: x; F sigma state read and written; V
-    words += 3 * d + again  # acceleration: x, then v read and written; V
-    words += 3 * d  # motion: v, then x read and written
+    words += 2 * d + spin + tensor + symmetric + 1  # projection: x v w F sigma V
+    if first:
+        words += d + strain + 1  # x; V
+    if again:
+        words += 3 * d + 2 * spin + 1  # x; v and w read and written; V
+    if stress_update == "first":
+        words += 4 * d + 2 * spin  # x v w read and written
+    else:
+        words += 3 * d + strain  # x read and written, v
+    if stress_update == "last":
+        words += 3 * d + 2 * spin  # x; v and w read and written
     words += d  # search for points that left: x
     return 8 * words

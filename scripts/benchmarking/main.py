@@ -60,9 +60,10 @@ class Bench:
 
     def rate_row(self, name: str, run: Run, target: float, dimension: int, variant: dict) -> Row:
         update = str(variant.get("solver.stress_update", '"both"')).strip('"')
+        spinning = "linear" not in str(variant.get("solver.shape"))  # the default of solver.spin
         return Row(name, run.rate, "M/s", target, detail={
             "points": run.done["points"], "steps": run.done["steps"], "energy_error": run.done["energy_error"],
-            "shares": run.shares, "bytes_per_point_step": cases.bytes_per_point_step(dimension, update)})
+            "shares": run.shares, "bytes_per_point_step": cases.bytes_per_point_step(dimension, update, spinning)})
 
     # The groups, in the order in which they run.
 
