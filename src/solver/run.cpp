@@ -260,8 +260,12 @@ class Run {
       fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
       fmt::print("most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
       const double mean = static_cast<double>(simulation_.total_points()) / ranks_;
-      fmt::print("balance: largest over mean points {:.3f}, patches moved {} times\n",
+      fmt::print("balance: largest over mean points {:.3f}, patches moved {} times",
                  static_cast<double>(most[2]) / mean, simulation_.times_balanced());
+      if (simulation_.times_balanced() > 0)
+        fmt::print(", in the time of {:.2g} steps each",
+                   simulation_.seconds_balancing() / simulation_.times_balanced() / (step_wall / steps));
+      fmt::print("\n");
     }
     RunSummary s;
     s.steps = simulation_.steps() - steps_before_, s.points = simulation_.total_points(), s.time = simulation_.time();

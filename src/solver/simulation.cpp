@@ -279,12 +279,14 @@ void Simulation<Dim>::balance() {
   MPI_Allreduce(MPI_IN_PLACE, work.data(), static_cast<int>(work.size()), MPI_INT64_T, MPI_SUM, comm_);
   const double now = imbalance_of(work, owner_, ranks_);
   if (now < parallel_.imbalance) return;
+  const double start = MPI_Wtime();
   const auto parts = distribute_patches(lattice_, work, ranks_, Partition::metis);
   const auto owner = keep_in_place(parts, owner_, work, ranks_);
   if (imbalance_of(work, owner, ranks_) > 0.95 * now) return;
   move_patches(patches_, owner_, owner, lattice_, comm_);
-  ++times_balanced_;
   connect_patches();
+  ++times_balanced_;
+  seconds_balancing_ += MPI_Wtime() - start;
 }
 
 template class Simulation<2>;

@@ -89,6 +89,7 @@ class Simulation {
   MPI_Comm communicator() const { return comm_; }
   const StageTimers& timers() const { return timers_; }
   int times_balanced() const { return times_balanced_; }
+  double seconds_balancing() const { return seconds_balancing_; }  // of this rank, while patches moved
   const Traffic& traffic() const { return messages_->traffic(); }
 
   /// Forgets the contacts summed so far. They are kept only where the case writes grains or contacts.
@@ -178,6 +179,7 @@ class Simulation {
   double time_ = 0, dt_ = 0;
   std::int64_t steps_ = 0, total_points_ = 0;
   int times_balanced_ = 0;
+  double seconds_balancing_ = 0;
   SpeedLimits speeds_;  // of this rank, in the step under way
   static constexpr int speed_size = 5;
   double speed_message_[speed_size] = {}, speed_result_[speed_size] = {};  // wave, point, failure, stop, wall
