@@ -41,7 +41,7 @@ inline constexpr Named<CompoundOperation> compound_names[] = {{"union", Compound
 
 /// Fields of the particle files, beside the position, which is always written.
 inline constexpr std::string_view particle_fields[] = {
-    "velocity", "spin", "stress", "body", "id", "volume", "mass", "deformation_gradient", "plastic_strain", "image"};
+    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "plastic_strain", "image", "spin"};
 inline constexpr std::size_t default_particle_fields = 6;  // the first six
 
 }  // namespace cairn::reading

@@ -46,8 +46,10 @@ void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim,
         sum += row;
         for (int d = 0; d < Dim; ++d) moment[d] += row * arm[d];
       });
-      turn_point(piece.points, first + lane, stencil, lane, moment, dt,
-                 settings.flip * (1.0 - settings.spin_relaxation));
+      double squared = 0;  // of the cells that the point moves in this step
+      for (int d = 0; d < Dim; ++d) squared += std::pow(dt * sum[M::velocity + d] * stencil.inverse_spacing[d], 2);
+      const double relaxed = std::min(1.0, settings.spin_relaxation * std::sqrt(squared));
+      turn_point(piece.points, first + lane, stencil, lane, moment, dt, settings.flip * (1.0 - relaxed));
     } else {
       stencil.for_nodes(lane,
                         [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });

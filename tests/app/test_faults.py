@@ -140,7 +140,7 @@ def full_for_pack(cairn: Program, scratch: Path) -> list[str]:
 def full_for_plot(scratch: Path) -> list[str]:
     """Pictures that do not fit: exit code 3, and no part of a picture."""
     whole = scratch / "whole_particles"
-    with SmallDisk(scratch / "disk_plot", 8 << 20) as disk:
+    with SmallDisk(scratch / "disk_plot", 32 << 20) as disk:
         run = disk.folder / "run"
         shutil.copytree(whole, run)
         disk.leave_free(4096)

@@ -73,6 +73,7 @@ struct PieceSetup {
   /// FLIP's spin w + dt sum N arm x a / sum N arm^2, blended with the grid's, sum N arm x v / sum N arm^2.
   Vec3 spin(const Eigen::MatrixXd& motion, const PointState<Dim>& at, double dt, double flip) const {
     Vec3 turn = Vec3::Zero(), grid = Vec3::Zero(), inertia = Vec3::Zero();
+    const Vec<Dim> at_velocity = interpolate(motion, Dim, at.x);
     for_each(box, [&](const Index<Dim>& i) {
       const double w = weight_of(lattice, shape, at.x, i).first;
       Vec3 arm = Vec3::Zero(), a = Vec3::Zero(), v = Vec3::Zero();
@@ -83,7 +84,9 @@ struct PieceSetup {
       turn += w * arm.cross(a), grid += w * arm.cross(v);
       inertia += w * (arm.squaredNorm() * Vec3::Ones() - arm.cwiseAbs2());
     });
-    const double keep = flip * 0.999;
+    double cells = 0;  // that the point moves
+    for (int d = 0; d < Dim; ++d) cells += std::pow(dt * at_velocity[d] / lattice.spacing()[d], 2);
+    const double keep = flip * (1 - std::min(1.0, settings.spin_relaxation * std::sqrt(cells)));
     const Vec3 spin = keep * (at.spin + dt * turn.cwiseQuotient(inertia)) + (1 - keep) * grid.cwiseQuotient(inertia);
     return Dim == 2 ? Vec3(0, 0, spin[2]) : spin;
   }

@@ -108,12 +108,13 @@ struct Stencil {
   alignas(64) double arm[spinning ? Dim : 1][n][lane_count];
   alignas(64) double spread[spinning ? Dim : 1][lane_count];
   int stride[3];
+  double inverse_spacing[Dim];  // [1/m]
 
   /// `x[d]` points to the positions along d [m], on a 64-byte boundary.
   Stencil(const Lattice<Dim>& lattice, const Shape& shape, const Box<Dim>& box, const double* const (&x)[Dim]) {
     Lanes offset{};
     for (int d = 0; d < Dim; ++d) {
-      stride[d] = box.stride(d);
+      stride[d] = box.stride(d), inverse_spacing[d] = lattice.inverse_spacing()[d];
       const Lanes xi = (load(x[d]) - lattice.lower()[d]) * lattice.inverse_spacing()[d];
       const Lanes start = Shape::first_node(xi);
       Lanes v[n], s[n];

@@ -23,9 +23,10 @@ struct TransferSettings {
   Vec<Dim> gravity = Vec<Dim>::Zero();
   double flip = 1;
   bool spin = false;  // points carry spin
-  // Share of the grid's spin that points take on in a step. It ends what the nodes do not see, a noise that feeds on
-  // moving points: without it a disk gains 10 % of its energy in 30 turns. Colliding disks lose 0.1 % by it.
-  double spin_relaxation = 1e-3;
+  // Share of the grid's spin that points take on for each cell width they move. A point's inertia changes as it moves
+  // through the cells; what the nodes do not see of spin, a noise, feeds on that: without relaxation a disk gains
+  // 10 % of its energy in 30 turns.
+  double spin_relaxation = 0.03;
   NormalSettings normals;
   std::array<std::array<bool, 2>, Dim> mirrored{};  // sides that are symmetry planes
   bool extras = false;                              // stress and position sums are needed
