@@ -35,20 +35,24 @@ Index<Dim> negated(Index<Dim> shift) {
 }  // namespace
 
 template <int Dim>
+NodeExchange<Dim>::NodeExchange(NeighbourExchange& messages, const std::vector<int>& owner,
+                                const std::vector<Patch<Dim>>& patches)
+    : messages_(messages), owner_(owner), sent_(patches.size()), parts_(patches.size()), position_(owner.size(), -1) {
+  for (std::size_t p = 0; p < patches.size(); ++p) position_[patches[p].id] = static_cast<int>(p);
+}
+
+template <int Dim>
 bool NodeExchange<Dim>::beside_others(const Patch<Dim>& patch) const {
   return std::any_of(patch.links.begin(), patch.links.end(),
                      [&](const Link<Dim>& link) { return owner_[link.patch] != messages_.rank(); });
 }
 
 template <int Dim>
-void NodeExchange<Dim>::begin_sums(const std::vector<Patch<Dim>>& patches, bool extras) {
+void NodeExchange<Dim>::begin_sums(bool extras) {
   using B = NodeBox<Dim>;
   out_ = {{{&B::sums, NodeSums<Dim>::width, NodeSums<Dim>::used}, {&B::force, vector_width, Dim}}, true};
   if (extras) out_.quantities.push_back({&B::extras, NodeExtras<Dim>::width, NodeExtras<Dim>::used});
-  sent_.resize(patches.size()), parts_.resize(patches.size());
   for (auto& list : sent_) list.clear();
-  position_.assign(owner_.size(), -1);
-  for (std::size_t p = 0; p < patches.size(); ++p) position_[patches[p].id] = static_cast<int>(p);
   messages_.begin();
 }
 

@@ -35,7 +35,7 @@ void Simulation<Dim>::step(double longest) {
   const double share = update == StressUpdate::both ? 0.5 : 1.0;
 
   choose_time_step(longest);
-  exchange_->begin_sums(patches_, transfer_.extras);
+  exchange_->begin_sums(transfer_.extras);
   exchange_after([&](std::size_t, P& patch) { project_points(patch); });
   if (first) {
     exchange_->begin(&NodeBox<Dim>::force);
@@ -262,7 +262,7 @@ void Simulation<Dim>::connect_patches() {
   const Traffic traffic = messages_ ? messages_->traffic() : Traffic{};
   messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
   messages_->traffic() = traffic;
-  exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_);
+  exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_, patches_);
   beside_others_.clear();
   for (const auto& patch : patches_) beside_others_.push_back(exchange_->beside_others(patch));
   migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_);

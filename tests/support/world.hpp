@@ -81,7 +81,7 @@ struct World {
     neighbours.erase(rank);
     for (const auto& point : points) add(point);
     messages = std::make_unique<NeighbourExchange>(comm, std::vector<int>(neighbours.begin(), neighbours.end()));
-    exchange = std::make_unique<NodeExchange<Dim>>(*messages, owner);
+    exchange = std::make_unique<NodeExchange<Dim>>(*messages, owner, patches);
     migration = std::make_unique<Migration<Dim>>(*messages, owner);
     ContactOptions contact;
     contact.release = Release::traction;
@@ -111,7 +111,7 @@ struct World {
   void sum_points() {
     for_pieces([&](auto& piece) { lay_out_nodes(piece, lattice, settings); });
     for_pieces([&](auto& piece) { project(piece, lattice, settings, density); });
-    exchange->begin_sums(patches, true);
+    exchange->begin_sums(true);
     sum();
   }
   /// Momentum once more, by the exchange of one array.

@@ -2,115 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "../support/lattices.hpp"
-#include "../support/pieces.hpp"
+#include "../support/piece_setup.hpp"
 
 namespace cairn {
 namespace {
 
 using namespace test;
-
-constexpr double round_off = 1e-13;  // relative to the largest value
-constexpr double density = 1300;
-constexpr int point_count = 61;  // seven chunks and a rest
-
-template <int Dim>
-struct PieceSetup {
-  Lattice<Dim> lattice = make_lattice();
-  TransferSettings<Dim> settings;
-  Box<Dim> box = lattice.patch_nodes(0);
-  Random random{7};
-  Piece<Dim> piece{0, 0};
-  Formula shape, normals;
-
-  explicit PieceSetup(ShapeFunction kind, NormalSource source = NormalSource::volume_gradient, bool extras = false,
-                      bool spin = true) {
-    SolverOptions solver;
-    solver.spin = spin;
-    solver.shape = kind;
-    solver.points_per_cell = Dim == 2 ? 9 : 8;
-    ContactOptions contact;
-    contact.normals = source;
-    if (extras) contact.release = Release::traction;
-    Vec<Dim> gravity;
-    for (int d = 0; d < Dim; ++d) gravity[d] = 3.0 * d - 4;
-    settings = TransferSettings<Dim>::make(solver, contact, gravity);
-    const double half = 0.5 / (Dim == 2 ? 3 : 2);
-    shape = formula_of(kind, {half, half, half});
-    normals = shape;
-    if (source == NormalSource::density) normals = [](int, double x) { return cell_density(x); };
-    if (source == NormalSource::volume_gradient && kind == ShapeFunction::linear)
-      normals = [half](int, double x) { return gimp(x, half); };
-    // Half a cell beyond the faces, where contact with walls lets points go.
-    piece = random_piece<Dim>(random, lattice, point_count, Vec<Dim>::Constant(-0.49), Vec<Dim>::Constant(5.49));
-    lay_out_nodes(piece, lattice, settings);
-  }
-  static Lattice<Dim> make_lattice() {
-    Index<Dim> cells;
-    cells.fill(5);
-    return lattice_of<Dim>(cells, {}, 5);
-  }
-  NaiveSums<Dim> naive() const {
-    return {piece.points, lattice, box, shape, normals, density, settings.gravity, settings.spin};
-  }
-  /// Random velocities at the nodes of the piece; returns them over the whole box.
-  Eigen::MatrixXd set_random(AlignedDoubles NodeBox<Dim>::*array, int width, int rows) {
-    auto& values = piece.nodes.*array;
-    values.assign(piece.nodes.box.size() * width, 0.0);
-    for (std::size_t i = 0; i < piece.nodes.box.size(); ++i)
-      for (int r = 0; r < rows; ++r) values[i * width + r] = random(-1, 1);
-    return nodal(piece.nodes, array, width, 0, rows, box);
-  }
-  /// sum over nodes of weight times the node's column, and of column times gradient.
-  Vec<Dim> interpolate(const Eigen::MatrixXd& columns, int first, const Vec<Dim>& x) const {
-    Vec<Dim> sum = Vec<Dim>::Zero();
-    for_each(box, [&](const Index<Dim>& i) {
-      const double w = weight_of(lattice, shape, x, i).first;
-      for (int d = 0; d < Dim; ++d) sum[d] += w * columns(first + d, box.offset(i));
-    });
-    return sum;
-  }
-  /// FLIP's spin w + dt sum N arm x a / sum N arm^2, blended with the grid's, sum N arm x v / sum N arm^2.
-  Vec3 spin(const Eigen::MatrixXd& motion, const PointState<Dim>& at, double dt, double flip) const {
-    Vec3 turn = Vec3::Zero(), grid = Vec3::Zero(), inertia = Vec3::Zero();
-    const Vec<Dim> at_velocity = interpolate(motion, Dim, at.x);
-    for_each(box, [&](const Index<Dim>& i) {
-      const double w = weight_of(lattice, shape, at.x, i).first;
-      Vec3 arm = Vec3::Zero(), a = Vec3::Zero(), v = Vec3::Zero();
-      for (int d = 0; d < Dim; ++d) {
-        arm[d] = lattice.node_position(d, i[d]) - at.x[d];
-        a[d] = motion(d, box.offset(i)), v[d] = motion(Dim + d, box.offset(i));
-      }
-      turn += w * arm.cross(a), grid += w * arm.cross(v);
-      inertia += w * (arm.squaredNorm() * Vec3::Ones() - arm.cwiseAbs2());
-    });
-    double cells = 0;  // that the point moves
-    for (int d = 0; d < Dim; ++d) cells += std::pow(dt * at_velocity[d] / lattice.spacing()[d], 2);
-    const double keep = flip * (1 - std::min(1.0, settings.spin_relaxation * std::sqrt(cells)));
-    const Vec3 spin = keep * (at.spin + dt * turn.cwiseQuotient(inertia)) + (1 - keep) * grid.cwiseQuotient(inertia);
-    return Dim == 2 ? Vec3(0, 0, spin[2]) : spin;
-  }
-  Mat3 velocity_gradient(const Eigen::MatrixXd& velocity, const Vec<Dim>& x) const {
-    Mat3 L = Mat3::Zero();
-    for_each(box, [&](const Index<Dim>& i) {
-      const Vec<Dim> g = weight_of(lattice, shape, x, i).second;
-      for (int d = 0; d < Dim; ++d)
-        for (int e = 0; e < Dim; ++e) L(d, e) += velocity(d, box.offset(i)) * g[e];
-    });
-    return L;
-  }
-};
-
-/// Calls check(setup) for every shape function.
-template <int Dim, class F>
-void for_shapes(F&& check) {
-  for (ShapeFunction kind : {ShapeFunction::linear, ShapeFunction::gimp, ShapeFunction::bspline2})
-    for (bool spin : {false, true}) {
-      SCOPED_TRACE(testing::Message() << "shape " << static_cast<int>(kind) << " in " << Dim << "D, spin " << spin);
-      PieceSetup<Dim> setup(kind, NormalSource::volume_gradient, false, spin);
-      check(setup);
-    }
-}
 
 template <int Dim>
 void check_projection(ShapeFunction kind, NormalSource source) {
@@ -359,78 +256,6 @@ void check_momentum(PieceSetup<Dim>& s) {
 TEST(ProjectMomentum, MatchesLoopsAloneAndWithAcceleration) {
   for_shapes<2>(check_momentum<2>);
   for_shapes<3>(check_momentum<3>);
-}
-
-/// Points -> nodes -> points: the angular momentum of points and nodes is the same, before and after forces act, and
-/// the points gain the energy that the forces spend, sum f dt . (v + v')/2 with v' projected again.
-template <int Dim>
-void check_spin_conservation(PieceSetup<Dim>& s) {
-  if (!s.settings.spin) return;
-  using N = NodeSums<Dim>;
-  const double dt = 0.01;
-  s.settings.spin_relaxation = 0;
-  const auto inertia = spin_inertia(s.piece, s.lattice, s.settings);
-  const auto points = [&] {
-    std::pair<Vec3, double> sum{Vec3::Zero(), 0};
-    for (int p = 0; p < point_count; ++p) {
-      const auto at = get_point(s.piece.points, p);
-      Vec3 x = Vec3::Zero(), v = Vec3::Zero(), own = Vec3::Zero();
-      x.head<Dim>() = at.x, v.head<Dim>() = at.v;
-      for (int c = 0; c < spin_size<Dim>; ++c) own[Dim == 2 ? 2 : c] = inertia[p][c] * at.spin[Dim == 2 ? 2 : c];
-      const double mass = density * at.volume0;
-      sum.first += mass * (x.cross(v) + own);
-      sum.second += 0.5 * mass * (v.squaredNorm() + own.dot(at.spin));
-    }
-    return sum;
-  };
-  const auto moment = [&](const Eigen::MatrixXd& vectors) {
-    Vec3 sum = Vec3::Zero();
-    for_each(s.box, [&](const Index<Dim>& i) {
-      Vec3 x = Vec3::Zero(), u = Vec3::Zero();
-      for (int d = 0; d < Dim; ++d) x[d] = s.lattice.node_position(d, i[d]), u[d] = vectors(d, s.box.offset(i));
-      sum += x.cross(u);
-    });
-    return sum;
-  };
-  project(s.piece, s.lattice, s.settings, density);
-  const auto before = points();
-  const Eigen::MatrixXd mass = nodal_sums(s.piece.nodes, N::mass, 1, s.box),
-                        p = nodal_sums(s.piece.nodes, N::momentum, Dim, s.box), f = nodal_force(s.piece.nodes, s.box);
-  EXPECT_LE((moment(p) - before.first).norm(), 1e-12 * before.first.norm());
-  integrate(s.piece, dt);
-  accelerate_and_project(s.piece, s.lattice, s.settings, density, dt);
-  const auto after = points();
-  const Eigen::MatrixXd again = nodal(s.piece.nodes, &NodeBox<Dim>::velocity, vector_width, 0, Dim, s.box);
-  double work = 0;
-  for (Eigen::Index i = 0; i < mass.cols(); ++i)
-    if (mass(0, i) > 0) work += dt * f.col(i).dot(p.col(i) + again.col(i)) / (2 * mass(0, i));
-  EXPECT_LE((after.first - before.first - dt * moment(f)).norm(), 1e-12 * before.first.norm());
-  EXPECT_NEAR(after.second - before.second, work, 1e-12 * before.second);
-}
-TEST(Spin, KeepsAngularMomentumAndEnergy) {
-  for_shapes<2>(check_spin_conservation<2>);
-  for_shapes<3>(check_spin_conservation<3>);
-}
-
-/// The velocity at the nodes of a body that turns as a whole is that of the turning, also at its surface.
-TEST(Spin, MakesRigidMotionExactAtEveryNode) {
-  using N = NodeSums<3>;
-  PieceSetup<3> s(ShapeFunction::gimp);
-  const Vec3 w(0.3, -0.7, 0.5), about(1, 2, 3);
-  for (int p = 0; p < point_count; ++p) {
-    auto at = get_point(s.piece.points, p);
-    at.v = w.cross(at.x - about), at.spin = w;
-    put_point(s.piece.points, p, at);
-  }
-  project(s.piece, s.lattice, s.settings, density);
-  const Eigen::MatrixXd mass = nodal_sums(s.piece.nodes, N::mass, 1, s.box),
-                        p = nodal_sums(s.piece.nodes, N::momentum, 3, s.box);
-  for_each(s.box, [&](const Index<3>& i) {
-    Vec3 x;
-    for (int d = 0; d < 3; ++d) x[d] = s.lattice.node_position(d, i[d]);
-    const int node = s.box.offset(i);
-    EXPECT_LE((p.col(node) - mass(0, node) * w.cross(x - about)).norm(), 1e-13 * mass.maxCoeff() * 5);
-  });
 }
 
 template <int Dim>

@@ -27,15 +27,16 @@ struct NodeQuantity {
 template <int Dim>
 class NodeExchange {
  public:
-  /// \param owner  the rank of every patch; must outlive this object unchanged
-  NodeExchange(NeighbourExchange& messages, const std::vector<int>& owner) : messages_(messages), owner_(owner) {}
+  /// \param owner    the rank of every patch; must outlive this object unchanged
+  /// \param patches  of this rank; none may come or go
+  NodeExchange(NeighbourExchange& messages, const std::vector<int>& owner, const std::vector<Patch<Dim>>& patches);
 
   /// True where a neighbour of the patch lives on another rank.
   bool beside_others(const Patch<Dim>& patch) const;
 
   /// For the sums, forces (and extras) of shared nodes, with the boxes they cover: `add` makes node boxes grow to hold
   /// what arrives, and ghost pieces come and go.
-  void begin_sums(const std::vector<Patch<Dim>>& patches, bool extras);
+  void begin_sums(bool extras);
   /// For one more array (forces of a new stress, momenta projected again) over the same nodes, put in the same order.
   void begin(AlignedDoubles NodeBox<Dim>::*values);
   void put(Patch<Dim>& patch, std::size_t p);
