@@ -78,6 +78,7 @@ struct InitialState {
   double volume_ratio = 1;  // det F
   std::array<double, state_capacity> state{};
 
+  InitialState() = default;
   InitialState(const Law& law, double pressure) {
     std::visit(
         [&](const auto& concrete) {
@@ -125,6 +126,8 @@ class Filler {
   void fill(Patch<Dim>& patch, std::int64_t first_id) const {
     using C = PointColumns<Dim>;
     const double volume = lattice_.cell_volume() / std::pow(per_direction_, Dim);
+    int filled = -1;  // points come body by body
+    InitialState initial;
     for_points(patch.id, [&](int b, const Vec3& x, const Vec3& shift) {
       const Body& body = bodies_[b];
       const auto& spec = case_.bodies[b];
@@ -135,7 +138,7 @@ class Filler {
       const Vec3 v = (body.rigid ? body.velocity : spec.velocity) + omega.cross(x - shift - body.centre);
       for (int c = 0; c < points.columns(); ++c) points.column(c)[p] = 0;
       const double pressure = body.rigid ? 0.0 : spec.initial_pressure;
-      const InitialState initial(materials_[body.material].law, pressure);
+      if (b != filled) initial = InitialState(materials_[body.material].law, pressure), filled = b;
       for (int i = 0; i < 3; ++i) {
         points.column(C::deformation + tensor_index<Dim>(i, i))[p] = std::cbrt(initial.volume_ratio);
         points.column(C::stress + i)[p] = -pressure;
