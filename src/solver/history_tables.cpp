@@ -20,7 +20,7 @@ std::vector<std::string> history_columns(int dimension) {
                                     "momentum_x",
                                     "momentum_y"};
   if (dimension == 3) names.emplace_back("momentum_z");
-  names.insert(names.end(), {"contact_nodes", "mass", "viscous_dissipation"});
+  names.insert(names.end(), {"contact_nodes", "mass", "viscous_dissipation", "numerical_dissipation"});
   return names;
 }
 
@@ -57,6 +57,7 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   row.emplace_back(static_cast<std::int64_t>(t.contact_nodes));
   row.emplace_back(t.mass);
   row.emplace_back(t.viscous);
+  row.emplace_back(t.numerical);
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

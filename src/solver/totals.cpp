@@ -5,9 +5,9 @@
 namespace cairn {
 namespace {
 
-constexpr int sum_count = 12;
+constexpr int sum_count = 13;
 using Sums = std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass,
-                                             // nodes, viscous
+                                             // nodes, viscous, numerical
 
 /// One point's deformation gradient.
 template <int Dim>
@@ -61,7 +61,7 @@ Totals Simulation<Dim>::totals() const {
     Sums sums{};
     for (const auto& piece : patch.pieces) add_piece(*this, piece, transfer_.gravity, sums);
     sums[4] = patch.ledger.contact_dissipation, sums[5] = patch.ledger.boundary_work;
-    sums[10] = static_cast<double>(patch.ledger.contact_nodes);
+    sums[10] = static_cast<double>(patch.ledger.contact_nodes), sums[12] = patch.ledger.numerical_dissipation;
     mine.push_back(patch.id);
     mine.insert(mine.end(), sums.begin(), sums.end());
   }
@@ -80,7 +80,7 @@ Totals Simulation<Dim>::totals() const {
   t.kinetic = sums[0], t.strain = sums[1], t.potential = sums[2], t.plastic = sums[3];
   t.contact_dissipation = sums[4], t.boundary_work = sums[5];
   t.momentum = Vec3(sums[6], sums[7], sums[8]);
-  t.mass = sums[9], t.contact_nodes = sums[10], t.viscous = sums[11];
+  t.mass = sums[9], t.contact_nodes = sums[10], t.viscous = sums[11], t.numerical = sums[12];
   return t;
 }
 

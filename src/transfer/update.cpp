@@ -17,27 +17,33 @@ MotionRow<Dim> load_motion(const double* motion, int node) {
 
 /// w_p += dt sum N arm x a / sum N arm^2, the transpose of how spin gives momentum to the nodes: energy and angular
 /// momentum go to the points as the nodes have them. `moment[d]` is sum N arm_d (acceleration, velocity); of the rest,
-/// 1 - `keep`, it takes the grid's spin.
+/// 1 - `keep`, it takes the grid's spin. Returns the energy that this takes, per half the point's mass.
 template <int Dim, class Shape>
-void turn_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
-                const MotionRow<Dim> (&moment)[Dim], double dt, double keep) {
+double turn_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
+                  const MotionRow<Dim> (&moment)[Dim], double dt, double keep) {
   using M = NodeMotion<Dim>;
+  double taken = 0;
   for_spins<Dim>([&](int s, int i, int j) {
     const double inertia = stencil.spread[i][lane] + stencil.spread[j][lane];
     if (!(inertia > 0)) return;  // on a node of linear shapes: it gives no momentum either
     const auto curl = [&](int first) { return (moment[i][first + j] - moment[j][first + i]) / inertia; };
     double& w = points.column(PointColumns<Dim>::spin + s)[p];
-    w = keep * (w + dt * curl(M::acceleration)) + (1.0 - keep) * curl(M::velocity);
+    const double turned = w + dt * curl(M::acceleration);
+    w = keep * turned + (1.0 - keep) * curl(M::velocity);
+    taken += inertia * (turned * turned - w * w);
   });
+  return taken;
 }
 
-/// v_p += dt sum N a, blended with sum N v; and spin.
+/// v_p += dt sum N a, blended with sum N v; and spin. Returns the energy [J] that blending and relaxation take.
 template <int Dim, class Shape>
-void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double dt,
-                     const TransferSettings<Dim>& settings) {
+double gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double density,
+                       double dt, const TransferSettings<Dim>& settings) {
   using M = NodeMotion<Dim>;
+  double total = 0;
   const double* motion = piece.nodes.motion.data();
   for (int lane = 0; lane < count; ++lane) {
+    double taken = 0;
     MotionRow<Dim> sum{};
     if constexpr (Stencil<Dim, Shape>::spinning) {
       MotionRow<Dim> moment[Dim] = {};
@@ -49,7 +55,7 @@ void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim,
       double squared = 0;  // of the cells that the point moves in this step
       for (int d = 0; d < Dim; ++d) squared += std::pow(dt * sum[M::velocity + d] * stencil.inverse_spacing[d], 2);
       const double relaxed = std::min(1.0, settings.spin_relaxation * std::sqrt(squared));
-      turn_point(piece.points, first + lane, stencil, lane, moment, dt, settings.flip * (1.0 - relaxed));
+      taken = turn_point(piece.points, first + lane, stencil, lane, moment, dt, settings.flip * (1.0 - relaxed));
     } else {
       stencil.for_nodes(lane,
                         [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
@@ -57,9 +63,14 @@ void gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim,
     for (int d = 0; d < Dim; ++d) {
       double& v = piece.points.column(PointColumns<Dim>::velocity + d)[first + lane];
       v += dt * sum[M::acceleration + d];
-      if (settings.flip != 1.0) v = settings.flip * v + (1.0 - settings.flip) * sum[M::velocity + d];
+      if (settings.flip == 1.0) continue;
+      const double updated = v;
+      v = settings.flip * updated + (1.0 - settings.flip) * sum[M::velocity + d];
+      taken += updated * updated - v * v;
     }
+    total += 0.5 * density * piece.points.column(PointColumns<Dim>::volume)[first + lane] * taken;
   }
+  return total;
 }
 
 template <int Dim, class Shape>
@@ -150,21 +161,25 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
 }
 
 template <int Dim>
-void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt) {
+double accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density,
+                  double dt) {
+  double taken = 0;
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    gather_velocity(piece, first, count, stencil, dt, settings);
+    taken += gather_velocity(piece, first, count, stencil, density, dt, settings);
   });
+  return taken;
 }
 
 template <int Dim>
-void accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                         double dt, SpeedLimits& speeds) {
-  double fastest = speeds.point * speeds.point;
+double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                           double density, double dt, SpeedLimits& speeds) {
+  double taken = 0, fastest = speeds.point * speeds.point;
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    gather_velocity(piece, first, count, stencil, dt, settings);
+    taken += gather_velocity(piece, first, count, stencil, density, dt, settings);
     fastest = move(piece.points, first, count, stencil, piece.nodes.motion.data(), dt, fastest);
   });
   speeds.point = std::sqrt(fastest);
+  return taken;
 }
 
 template <int Dim>
@@ -177,13 +192,15 @@ void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Tran
 }
 
 template <int Dim>
-void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                            double density, double dt) {
+double accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                              double density, double dt) {
+  double taken = 0;
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    gather_velocity(piece, first, count, stencil, dt, settings);
+    taken += gather_velocity(piece, first, count, stencil, density, dt, settings);
     scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
   });
+  return taken;
 }
 
 template <int Dim>
@@ -264,23 +281,23 @@ void velocity_from_motion(Piece<Dim>& piece) {
     std::copy_n(nodes.motion.data() + node * M::width + M::velocity, Dim, nodes.velocity.data() + node * vector_width);
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                      \
-  template void update_stress_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,  \
-                                       double, double, double, SpeedLimits&);                                       \
-  template void update_stress_and_force(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, \
-                                        double, double, SpeedLimits&);                                              \
-  template void accelerate(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);                 \
-  template void project_momentum(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);           \
-  template void accelerate_and_project(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double,      \
-                                       double);                                                                     \
-  template void accelerate_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double,         \
-                                    SpeedLimits&);                                                                  \
-  template void integrate(Piece<Dim>&, double);                                                                     \
-  template void velocity_from_sums(Piece<Dim>&);                                                                    \
-  template void velocity_from_momentum(Piece<Dim>&);                                                                \
-  template void velocity_from_motion(Piece<Dim>&);                                                                  \
-  template void centre_motion(Piece<Dim>&);                                                                         \
-  template std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>&, const Lattice<Dim>&,     \
+#define CAIRN_INSTANTIATE(Dim)                                                                                        \
+  template void update_stress_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,    \
+                                       double, double, double, SpeedLimits&);                                         \
+  template void update_stress_and_force(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,   \
+                                        double, double, SpeedLimits&);                                                \
+  template double accelerate(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, double);         \
+  template void project_momentum(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double);             \
+  template double accelerate_and_project(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double,      \
+                                         double);                                                                     \
+  template double accelerate_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, double, \
+                                      SpeedLimits&);                                                                  \
+  template void integrate(Piece<Dim>&, double);                                                                       \
+  template void velocity_from_sums(Piece<Dim>&);                                                                      \
+  template void velocity_from_momentum(Piece<Dim>&);                                                                  \
+  template void velocity_from_motion(Piece<Dim>&);                                                                    \
+  template void centre_motion(Piece<Dim>&);                                                                           \
+  template std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>&, const Lattice<Dim>&,       \
                                                                         const TransferSettings<Dim>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -136,7 +136,7 @@ void add_kernels() {
             [](W& w, P& p) { accelerate_and_project(p, w.lattice, w.settings, density, dt); });
       plain("accelerate_and_move", [](W& w, P& p) {
         SpeedLimits speeds;
-        accelerate_and_move(p, w.lattice, w.settings, 0, speeds);
+        accelerate_and_move(p, w.lattice, w.settings, density, 0, speeds);
       });
       for (const char* law : {"neo_hookean", "von_mises"}) {
         add<Dim>(

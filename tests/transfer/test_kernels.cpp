@@ -110,6 +110,9 @@ TEST(Project, EmptyPieceHasNoNodes) {
 
 const ParameterValues elastic = {{"shear_modulus", 3e5}, {"bulk_modulus", 7e5}};
 
+/// What a step with A = dt L multiplies the deformation gradient by.
+Mat3 increment_of(const Mat3& A) { return Mat3::Identity() + A + A * A / 2 + A * A * A / 8; }
+
 /// Deformation, stress and the force of the new stress after a strain step, point by point.
 template <int Dim>
 void check_stress(PieceSetup<Dim>& s, bool with_force) {
@@ -123,7 +126,7 @@ void check_stress(PieceSetup<Dim>& s, bool with_force) {
   for (int p = 0; p < point_count; ++p) {
     auto at = get_point(s.piece.points, p);
     const Mat3 A = dt * s.velocity_gradient(velocity, at.x);
-    at.F = (Mat3::Identity() + A + 0.5 * A * A) * at.F;
+    at.F = increment_of(A) * at.F;
     Symmetric<Dim, double> stress{};
     double* none = nullptr;
     const double modulus =
@@ -181,7 +184,7 @@ TEST(UpdateStressAndMove, UpdatesTheStateOfEveryPoint) {
   std::vector<double> expected;
   for (int p = 0; p < 13; ++p) {
     const auto at = get_point(s.piece.points, p);
-    const Mat3 A = 0.01 * s.velocity_gradient(velocity, at.x), F = (Mat3::Identity() + A + 0.5 * A * A) * at.F;
+    const Mat3 A = 0.01 * s.velocity_gradient(velocity, at.x), F = increment_of(A) * at.F;
     auto stress = symmetric<3>(at.stress);
     double state = 0;
     std::get<Hypoelastic>(law).update(tensor<3>(A), tensor<3>(F), F.determinant(), stress, &state);
@@ -194,6 +197,41 @@ TEST(UpdateStressAndMove, UpdatesTheStateOfEveryPoint) {
     EXPECT_NEAR(s.piece.points.column(PointColumns<3>::state)[p], expected[p], 1e-11 * std::abs(expected[p]));
 }
 
+/// Kinetic energy of a piece's points, spin included [J].
+template <int Dim>
+double kinetic_energy(const Piece<Dim>& piece, const PieceSetup<Dim>& s) {
+  const auto inertia = spin_inertia(piece, s.lattice, s.settings);
+  double sum = 0;
+  for (int p = 0; p < point_count; ++p) {
+    const auto at = get_point(piece.points, p);
+    double squared = at.v.squaredNorm();
+    for (int i = 0; i < spin_size<Dim>; ++i)
+      squared += inertia[p][i] * std::pow(piece.points.column(PointColumns<Dim>::spin + i)[p], 2);
+    sum += 0.5 * density * at.volume0 * squared;
+  }
+  return sum;
+}
+
+/// What blending and relaxation take is the difference to an update without either.
+template <int Dim>
+void check_energy_taken(PieceSetup<Dim>& s) {
+  const double dt = 0.03;
+  s.set_random(&NodeBox<Dim>::motion, NodeMotion<Dim>::width, 2 * Dim);
+  Piece<Dim> free = s.piece;
+  s.settings.flip = 0.9;
+  const double taken = accelerate(s.piece, s.lattice, s.settings, density, dt);
+  s.settings.flip = 1, s.settings.spin_relaxation = 0;
+  const double nothing = accelerate(free, s.lattice, s.settings, density, dt);
+  EXPECT_NEAR(nothing, 0, round_off * kinetic_energy(free, s));
+  const double expected = kinetic_energy(free, s) - kinetic_energy(s.piece, s);
+  EXPECT_GT(std::abs(expected), 1e-3 * kinetic_energy(free, s));
+  EXPECT_NEAR(taken, expected, 1e-12 * kinetic_energy(free, s));
+}
+TEST(Accelerate, TellsTheEnergyItTakes) {
+  for_shapes<2>(check_energy_taken<2>);
+  for_shapes<3>(check_energy_taken<3>);
+}
+
 template <int Dim>
 void check_motion(PieceSetup<Dim>& s) {
   const double dt = 0.03;
@@ -202,7 +240,7 @@ void check_motion(PieceSetup<Dim>& s) {
     s.settings.flip = flip;
     std::vector<PointState<Dim>> before;
     for (int p = 0; p < point_count; ++p) before.push_back(get_point(s.piece.points, p));
-    accelerate(s.piece, s.lattice, s.settings, dt);
+    accelerate(s.piece, s.lattice, s.settings, density, dt);
     for (int p = 0; p < point_count; ++p) {
       const Vec<Dim> a = s.interpolate(motion, 0, before[p].x), u = s.interpolate(motion, Dim, before[p].x);
       const Vec<Dim> v = flip * (before[p].v + dt * a) + (1 - flip) * u;
@@ -215,9 +253,9 @@ void check_motion(PieceSetup<Dim>& s) {
   double fastest = 0;
   for (int p = 0; p < point_count; ++p) before.push_back(get_point(s.piece.points, p));
   Piece<Dim> alone = s.piece;
-  accelerate(alone, s.lattice, s.settings, dt);
+  accelerate(alone, s.lattice, s.settings, density, dt);
   SpeedLimits speeds;
-  accelerate_and_move(s.piece, s.lattice, s.settings, dt, speeds);
+  accelerate_and_move(s.piece, s.lattice, s.settings, density, dt, speeds);
   for (int p = 0; p < point_count; ++p) {
     const auto at = get_point(s.piece.points, p), expected = get_point(alone.points, p);
     EXPECT_LE((at.x - before[p].x - dt * s.interpolate(motion, Dim, before[p].x)).norm(), 10 * round_off);
@@ -244,7 +282,7 @@ void check_momentum(PieceSetup<Dim>& s) {
   EXPECT_LE(relative_difference(momentum(s.piece), s.naive().momentum), round_off);
 
   Piece<Dim> at_once = s.piece;
-  accelerate(s.piece, s.lattice, s.settings, dt);
+  accelerate(s.piece, s.lattice, s.settings, density, dt);
   EXPECT_GT(relative_difference(momentum(s.piece), s.naive().momentum), round_off);  // not projected again yet
   project_momentum(s.piece, s.lattice, s.settings, density);
   EXPECT_LE(relative_difference(momentum(s.piece), s.naive().momentum), round_off);

@@ -105,12 +105,15 @@ Symmetric<Dim, T> scale_and_shift(const Symmetric<Dim, T>& a, T scale, T diagona
   return r;
 }
 
-/// F <- exp(A) F to second order in A = dt L. Forward Euler, (I + A) F, would grow det F by 4 % in a turn of 1000
-/// steps; this grows it by less than 1e-6.
+/// F <- (I + A + A^2/2 + A^3/8) F: exp(A) to second order in A = dt L. With 1/8 for the third order a rotation by t
+/// stretches by t^6/128 alone (with 1/6 it shrinks by t^4/24, without it stretches by t^4/8): a body that turns for
+/// long keeps its volume. The out-of-plane component in 2D, which does not turn, is 1 + a + a^2/2.
 template <int Dim, class T>
 Tensor<Dim, T> advance_deformation(const Tensor<Dim, T>& A, const Tensor<Dim, T>& F) {
-  Tensor<Dim, T> increment = A * A;
-  for (int i = 0; i < tensor_size<Dim>; ++i) increment.c[i] = A.c[i] + 0.5 * increment.c[i];
+  const Tensor<Dim, T> square = A * A, cube = square * A;
+  Tensor<Dim, T> increment;
+  for (int i = 0; i < Dim * Dim; ++i) increment.c[i] = A.c[i] + 0.5 * square.c[i] + 0.125 * cube.c[i];
+  if constexpr (Dim == 2) increment.c[4] = A.c[4] + 0.5 * square.c[4];
   Tensor<Dim, T> result = increment * F;
   for (int i = 0; i < tensor_size<Dim>; ++i) result.c[i] += F.c[i];
   return result;

@@ -67,13 +67,15 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
 /// at the node, and too slow at its surface. Points that carry an angular velocity w give the nodes
 /// m N (v + w x arm), arm = node minus point, which is exact for rigid motion (as in APIC, Jiang et al. 2015); they
 /// take it up as FLIP does, by the transpose of that sum, so that neither energy nor angular momentum is lost.
+/// Returns the energy [J] that blending with PIC and the relaxation of spin take.
 template <int Dim>
-void accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double dt);
+double accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density,
+                  double dt);
 
 /// As accelerate, then x_p += dt sum N v (eq. 10), in the same pass; raises `speeds.point`.
 template <int Dim>
-void accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                         double dt, SpeedLimits& speeds);
+double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                           double density, double dt, SpeedLimits& speeds);
 
 /// points -> nodes: momentum alone, at the positions of the last projection, into NodeBox::velocity [kg m/s].
 template <int Dim>
@@ -82,8 +84,8 @@ void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Tran
 
 /// accelerate and project_momentum in one pass.
 template <int Dim>
-void accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                            double density, double dt);
+double accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                              double density, double dt);
 
 /// nodes: NodeMotion from sums and force: a = f/m, v = p/m + dt a (eq. 9).
 template <int Dim>
