@@ -1,6 +1,7 @@
 #pragma once
 /// The pieces that every transfer is made of: loops over points, eight at a time, and what is gathered or scattered.
 /// Nodes are visited point by point, and a node's quantities lie side by side: one vector operation serves them all.
+/// Weights are products: what a row of nodes along x has in common is multiplied once for the row.
 
 #include <algorithm>
 #include <limits>
@@ -54,27 +55,91 @@ void for_spins(F&& f) {
   for (int s = 0; s < spin_size<Dim>; ++s) Dim == 2 ? f(s, 0, 1) : f(s, (s + 1) % 3, (s + 2) % 3);
 }
 
-/// Calls add(node, row, gradient) for every node of point p with what it gives to the node's row: N times `value`,
-/// where the momentum m (v + w x arm) takes the columns from `momentum` on.
-template <int momentum, class Row, int Dim, class Shape, class F>
-void scatter_row(const Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane, double mass, Row value,
-                 F&& add) {
-  using C = PointColumns<Dim>;
-  for (int d = 0; d < Dim; ++d) value[momentum + d] = mass * points.column(C::velocity + d)[p];
-  if constexpr (Stencil<Dim, Shape>::spinning) {
-    Row turn[Dim] = {};  // for each direction of the arm
-    for_spins<Dim>([&](int s, int i, int j) {
-      const double w = mass * points.column(C::spin + s)[p];
-      turn[i][momentum + j] += w, turn[j][momentum + i] -= w;
-    });
-    stencil.for_nodes(lane, [&](int node, double w, const double(&g)[Dim], const double(&arm)[Dim]) {
-      Row sum = value;
-      for (int d = Dim - 1; d >= 0; --d) sum += turn[d] * arm[d];
-      add(node, sum * w, g);
-    });
-  } else {
-    stencil.for_nodes(lane, [&](int node, double w, const double(&g)[Dim]) { add(node, value * w, g); });
+/// A node's row of four or eight quantities.
+template <class Row>
+inline constexpr int row_width = sizeof(Row) / sizeof(double);
+template <class Row>
+Row load_row(const double* rows, int node) {
+  if constexpr (row_width<Row> == 4)
+    return load4(rows + node * 4);
+  else
+    return load(rows + node * 8);
+}
+template <class Row>
+void add_row(double* rows, int node, Row row) {
+  if constexpr (row_width<Row> == 4)
+    store4(rows + node * 4, load4(rows + node * 4) + row);
+  else
+    store(rows + node * 8, load(rows + node * 8) + row);
+}
+
+inline constexpr int no_gradient = -1;
+
+template <class Row>
+Row equal_row(double a) {
+  if constexpr (row_width<Row> == 4)
+    return broadcast4(a);
+  else
+    return broadcast(a);
+}
+
+/// The row with the momentum p alone: where NodeSums has it, or at the start of a row of four.
+template <class Row, int Dim>
+Row momentum_row(const double (&p)[Dim]) {
+  static_assert(NodeSums<Dim>::momentum == 1);
+  const double z = Dim == 3 ? p[Dim - 1] : 0.0;
+  if constexpr (row_width<Row> == 4)
+    return Row{p[0], p[1], z, 0};
+  else
+    return Row{0, p[0], p[1], z, 0, 0, 0, 0};
+}
+
+/// Adds N times `value` to the rows of a point's nodes; in the columns from `gradient` on, grad N takes the place of N.
+/// `turn[d]` times the arm along d is added to `value` first (with spin).
+template <int gradient, class Row, int Dim, class Shape>
+void scatter(const Stencil<Dim, Shape>& stencil, int lane, const Row& value, const Row (&turn)[Dim], double* rows) {
+  using S = Stencil<Dim, Shape>;
+  const auto x = stencil.along_x(lane);
+  Row factor[S::n];
+  for (int i = 0; i < S::n; ++i) {
+    factor[i] = equal_row<Row>(x.value[i]);
+    if constexpr (gradient != no_gradient) factor[i][gradient] = x.slope[i];
   }
+  stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+    Row common = equal_row<Row>(row.value), sum = value;
+    if constexpr (gradient != no_gradient)
+      for (int d = 1; d < Dim; ++d) common[gradient + d] = row.slope[d];
+    if constexpr (S::spinning)
+      for (int d = 1; d < Dim; ++d) sum += turn[d] * row.arm[d];
+    sum *= common;
+    for (int i = 0; i < S::n; ++i) {
+      Row given = sum * factor[i];
+      if constexpr (S::spinning) given += turn[0] * (row.value * x.lever[i]);
+      add_row(rows, node + i, given);
+    }
+  });
+}
+
+/// As scatter, with the momentum m (v + w x arm) of point p besides `value`.
+template <int gradient, class Row, int Dim, class Shape>
+void scatter_moving(const Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane, double mass,
+                    const Row& value, double* rows) {
+  using C = PointColumns<Dim>;
+  double momentum[Dim];
+  for (int d = 0; d < Dim; ++d) momentum[d] = mass * points.column(C::velocity + d)[p];
+  Row turn[Dim] = {};  // m w x the unit vector along d
+  if constexpr (Stencil<Dim, Shape>::spinning) {
+    double w[spin_size<Dim>];
+    for (int s = 0; s < spin_size<Dim>; ++s) w[s] = mass * points.column(C::spin + s)[p];
+    if constexpr (Dim == 2) {
+      turn[0] = momentum_row<Row, 2>({0, w[0]}), turn[1] = momentum_row<Row, 2>({-w[0], 0});
+    } else {
+      turn[0] = momentum_row<Row, 3>({0, w[2], -w[1]});
+      turn[1] = momentum_row<Row, 3>({-w[2], 0, w[0]});
+      turn[2] = momentum_row<Row, 3>({w[1], -w[0], 0});
+    }
+  }
+  scatter<gradient>(stencil, lane, value + momentum_row<Row>(momentum), turn, rows);
 }
 
 /// The deformation gradient of eight points.
@@ -90,10 +155,16 @@ template <int Dim, class Shape>
 Tensor<Dim, Lanes> gather_strain(const Stencil<Dim, Shape>& stencil, int count, const double* velocity, double dt) {
   alignas(64) double rows[Dim][Dim][lane_count] = {};
   for (int lane = 0; lane < count; ++lane) {
+    const auto x = stencil.along_x(lane);
     Lanes4 sum[Dim] = {};
-    stencil.for_nodes(lane, [&](int node, double /*w*/, const double(&g)[Dim]) {
-      const Lanes4 v = load4(velocity + node * vector_width);
-      for (int j = 0; j < Dim; ++j) sum[j] += v * g[j];
+    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      Lanes4 by_value{}, by_slope{};
+      for (int i = 0; i < Stencil<Dim, Shape>::n; ++i) {
+        const Lanes4 v = load_row<Lanes4>(velocity, node + i);
+        by_value += v * x.value[i], by_slope += v * x.slope[i];
+      }
+      sum[0] += by_slope * row.value;
+      for (int j = 1; j < Dim; ++j) sum[j] += by_value * row.slope[j];
     });
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < Dim; ++j) rows[i][j][lane] = dt * sum[j][i];
@@ -156,15 +227,21 @@ struct PointForce {
 
   template <class Shape>
   void scatter(const Stencil<Dim, Shape>& stencil, int lane, double* force) const {
-    Lanes4 column[Dim] = {};  // column j of V sigma
-    for (int j = 0; j < Dim; ++j)
-      for (int i = 0; i < Dim; ++i) column[j][i] = -flux[symmetric_index<Dim>(i, j)][lane];
+    const auto column = [&](int j) {  // of -V sigma
+      double c[Dim];
+      for (int i = 0; i < Dim; ++i) c[i] = -flux[symmetric_index<Dim>(i, j)][lane];
+      return momentum_row<Lanes4>(c);
+    };
+    Lanes4 columns[Dim];
+    for (int j = 0; j < Dim; ++j) columns[j] = column(j);
     const Lanes4 weight = gravity * mass[lane];
-    stencil.for_nodes(lane, [&](int node, double w, const double(&g)[Dim]) {
-      double* f = force + node * vector_width;
-      Lanes4 sum = load4(f) + weight * w;
-      for (int j = 0; j < Dim; ++j) sum += column[j] * g[j];
-      store4(f, sum);
+    const auto x = stencil.along_x(lane);
+    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      const Lanes4 by_slope = columns[0] * row.value;
+      Lanes4 by_value = weight * row.value;
+      for (int j = 1; j < Dim; ++j) by_value += columns[j] * row.slope[j];
+      for (int i = 0; i < Stencil<Dim, Shape>::n; ++i)
+        add_row(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
     });
   }
 };

@@ -15,17 +15,11 @@ void scatter_sums(const Points<Dim>& points, int first, int count, const Stencil
   store(current, load(points.column(C::volume) + first) * determinant(load_deformation(points, first)));
   for (int lane = 0; lane < count; ++lane) {
     const double mass = density * points.column(C::volume)[first + lane];
-    Lanes value{}, slope[Dim] = {};
+    Lanes value{};
     value[N::mass] = mass;
     value[N::volume] = current[lane];
-    for (int d = 0; d < Dim; ++d) slope[d][N::gradient + d] = by_mass ? mass : current[lane];
-    scatter_row<N::momentum>(points, first + lane, stencil, lane, mass, value,
-                             [&](int node, Lanes row, const double(&g)[Dim]) {
-                               double* at = sums + node * N::width;
-                               Lanes sum = load(at) + row;
-                               for (int d = 0; d < Dim; ++d) sum += slope[d] * g[d];
-                               store(at, sum);
-                             });
+    for (int d = 0; d < Dim; ++d) value[N::gradient + d] = by_mass ? mass : current[lane];
+    scatter_moving<N::gradient>(points, first + lane, stencil, lane, mass, value, sums);
   }
 }
 
@@ -44,15 +38,11 @@ void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
       const Lanes volume0 = load(piece.points.column(C::volume) + first);
       store(share, volume0 * (settings.normals.by_mass ? broadcast(density)
                                                        : determinant(load_deformation(piece.points, first))));
-      for (int lane = 0; lane < count; ++lane)
-        stencil.for_nodes(lane, [&](int node, double /*w*/, const double(&g)[Dim]) {
-          // The upper half of a node's row holds the gradient (and in 3D, before it, the volume).
-          static_assert(N::gradient >= 4 && N::gradient + Dim <= N::width);
-          Lanes4 slope{};
-          for (int d = 0; d < Dim; ++d) slope[N::gradient - 4 + d] = g[d];
-          double* upper = sums + node * N::width + 4;
-          store4(upper, load4(upper) + slope * share[lane]);
-        });
+      for (int lane = 0; lane < count; ++lane) {
+        Lanes value{};
+        for (int d = 0; d < Dim; ++d) value[N::gradient + d] = share[lane];
+        scatter<N::gradient, Lanes, Dim>(stencil, lane, value, {}, sums);
+      }
     });
   });
 }

@@ -9,10 +9,32 @@ using namespace kernels;
 template <int Dim>
 using MotionRow = std::conditional_t<Dim == 2, Lanes4, Lanes>;
 
+/// Sums over a point's nodes.
 template <int Dim>
-MotionRow<Dim> load_motion(const double* motion, int node) {
-  if constexpr (Dim == 2) return load4(motion + node * NodeMotion<Dim>::width);
-  if constexpr (Dim == 3) return load(motion + node * NodeMotion<Dim>::width);
+struct PointMotion {
+  MotionRow<Dim> sum{};          // N (acceleration, velocity)
+  MotionRow<Dim> moment[Dim]{};  // with spin: for each direction, N arm (acceleration, velocity)
+};
+
+template <int Dim, class Shape>
+PointMotion<Dim> gather_motion(const Stencil<Dim, Shape>& stencil, int lane, const double* motion) {
+  using S = Stencil<Dim, Shape>;
+  const auto x = stencil.along_x(lane);
+  PointMotion<Dim> m;
+  stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+    MotionRow<Dim> by_value{}, by_lever{};
+    for (int i = 0; i < S::n; ++i) {
+      const auto at = load_row<MotionRow<Dim>>(motion, node + i);
+      by_value += at * x.value[i];
+      if constexpr (S::spinning) by_lever += at * x.lever[i];
+    }
+    m.sum += by_value * row.value;
+    if constexpr (S::spinning) {
+      m.moment[0] += by_lever * row.value;
+      for (int d = 1; d < Dim; ++d) m.moment[d] += by_value * (row.value * row.arm[d]);
+    }
+  });
+  return m;
 }
 
 /// w_p += dt sum N arm x a / sum N arm^2, the transpose of how spin gives momentum to the nodes: energy and angular
@@ -35,78 +57,63 @@ double turn_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil
   return taken;
 }
 
-/// v_p += dt sum N a, blended with sum N v; and spin. Returns the energy [J] that blending and relaxation take.
+/// v_p += dt sum N a, blended with sum N v; and spin. Returns the energy that blending and relaxation take, per half
+/// the point's mass.
 template <int Dim, class Shape>
-double gather_velocity(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double density,
-                       double dt, const TransferSettings<Dim>& settings) {
+double accelerate_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
+                        const PointMotion<Dim>& m, double dt, const TransferSettings<Dim>& settings) {
   using M = NodeMotion<Dim>;
-  double total = 0;
-  const double* motion = piece.nodes.motion.data();
-  for (int lane = 0; lane < count; ++lane) {
-    double taken = 0;
-    MotionRow<Dim> sum{};
-    if constexpr (Stencil<Dim, Shape>::spinning) {
-      MotionRow<Dim> moment[Dim] = {};
-      stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim], const double(&arm)[Dim]) {
-        const auto row = load_motion<Dim>(motion, node) * w;
-        sum += row;
-        for (int d = 0; d < Dim; ++d) moment[d] += row * arm[d];
-      });
-      double squared = 0;  // of the cells that the point moves in this step
-      for (int d = 0; d < Dim; ++d) squared += std::pow(dt * sum[M::velocity + d] * stencil.inverse_spacing[d], 2);
-      const double relaxed = std::min(1.0, settings.spin_relaxation * std::sqrt(squared));
-      taken = turn_point(piece.points, first + lane, stencil, lane, moment, dt, settings.flip * (1.0 - relaxed));
-    } else {
-      stencil.for_nodes(lane,
-                        [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
-    }
-    for (int d = 0; d < Dim; ++d) {
-      double& v = piece.points.column(PointColumns<Dim>::velocity + d)[first + lane];
-      v += dt * sum[M::acceleration + d];
-      if (settings.flip == 1.0) continue;
-      const double updated = v;
-      v = settings.flip * updated + (1.0 - settings.flip) * sum[M::velocity + d];
-      taken += updated * updated - v * v;
-    }
-    total += 0.5 * density * piece.points.column(PointColumns<Dim>::volume)[first + lane] * taken;
+  double taken = 0;
+  if constexpr (Stencil<Dim, Shape>::spinning) {
+    double squared = 0;  // of the cells that the point moves in this step
+    for (int d = 0; d < Dim; ++d) squared += std::pow(dt * m.sum[M::velocity + d] * stencil.inverse_spacing[d], 2);
+    const double relaxed = std::min(1.0, settings.spin_relaxation * std::sqrt(squared));
+    taken = turn_point(points, p, stencil, lane, m.moment, dt, settings.flip * (1.0 - relaxed));
   }
-  return total;
+  for (int d = 0; d < Dim; ++d) {
+    double& v = points.column(PointColumns<Dim>::velocity + d)[p];
+    v += dt * m.sum[M::acceleration + d];
+    if (settings.flip == 1.0) continue;
+    const double updated = v;
+    v = settings.flip * updated + (1.0 - settings.flip) * m.sum[M::velocity + d];
+    taken += updated * updated - v * v;
+  }
+  return taken;
+}
+
+/// accelerate_point for eight points, calling after(lane, motion) for each. Returns the energy taken [J].
+template <int Dim, class Shape, class F>
+double accelerate_points(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double density,
+                         double dt, const TransferSettings<Dim>& settings, F&& after) {
+  double taken = 0;
+  for (int lane = 0; lane < count; ++lane) {
+    const PointMotion<Dim> m = gather_motion(stencil, lane, piece.nodes.motion.data());
+    const double half_mass = 0.5 * density * piece.points.column(PointColumns<Dim>::volume)[first + lane];
+    taken += half_mass * accelerate_point(piece.points, first + lane, stencil, lane, m, dt, settings);
+    after(lane, m);
+  }
+  return taken;
 }
 
 template <int Dim, class Shape>
-void scatter_momentum(const Points<Dim>& points, int first, int count, const Stencil<Dim, Shape>& stencil,
-                      double density, double* momentum) {
-  for (int lane = 0; lane < count; ++lane) {
-    const double mass = density * points.column(PointColumns<Dim>::volume)[first + lane];
-    scatter_row<0>(points, first + lane, stencil, lane, mass, Lanes4{},
-                   [&](int node, Lanes4 row, const double(&)[Dim]) {
-                     double* at = momentum + node * vector_width;
-                     store4(at, load4(at) + row);
-                   });
-  }
+void scatter_momentum(const Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane, double density,
+                      double* momentum) {
+  const double mass = density * points.column(PointColumns<Dim>::volume)[p];
+  scatter_moving<no_gradient>(points, p, stencil, lane, mass, Lanes4{}, momentum);
 }
 
-/// x_p += dt sum N v; returns the largest squared speed, infinite where one is not finite.
-template <int Dim, class Shape>
-double move(Points<Dim>& points, int first, int count, const Stencil<Dim, Shape>& stencil, const double* motion,
-            double dt, double fastest) {
+/// x_p += dt sum N v; returns the larger of `fastest` and its squared speed, infinite where that is not finite.
+template <int Dim>
+double move(Points<Dim>& points, int p, const PointMotion<Dim>& m, double dt, double fastest) {
   using C = PointColumns<Dim>;
-  using M = NodeMotion<Dim>;
-  constexpr double largest_number = std::numeric_limits<double>::max();
-  constexpr double infinity = std::numeric_limits<double>::infinity();
-  for (int lane = 0; lane < count; ++lane) {
-    MotionRow<Dim> sum{};
-    stencil.for_nodes(lane,
-                      [&](int node, double w, const double(&)[Dim]) { sum += load_motion<Dim>(motion, node) * w; });
-    double squared = 0;
-    for (int d = 0; d < Dim; ++d) {
-      points.column(d)[first + lane] += dt * sum[M::velocity + d];
-      const double v = points.column(C::velocity + d)[first + lane];
-      squared += v * v;
-    }
-    fastest = squared <= largest_number ? std::max(fastest, squared) : infinity;
+  double squared = 0;
+  for (int d = 0; d < Dim; ++d) {
+    points.column(d)[p] += dt * m.sum[NodeMotion<Dim>::velocity + d];
+    const double v = points.column(C::velocity + d)[p];
+    squared += v * v;
   }
-  return fastest;
+  return squared <= std::numeric_limits<double>::max() ? std::max(fastest, squared)
+                                                       : std::numeric_limits<double>::infinity();
 }
 
 /// Calls f(first, count, stencil) for every eight points of the piece on its whole node box.
@@ -134,7 +141,10 @@ void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
         for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
           const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), strain_dt);
           fastest_wave = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest_wave);
-          fastest_point = move(piece.points, first, count, stencil, piece.nodes.motion.data(), dt, fastest_point);
+          for (int lane = 0; lane < count; ++lane) {
+            const auto m = gather_motion(stencil, lane, piece.nodes.motion.data());
+            fastest_point = move(piece.points, first + lane, m, dt, fastest_point);
+          }
         });
       },
       law);
@@ -165,7 +175,8 @@ double accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfer
                   double dt) {
   double taken = 0;
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    taken += gather_velocity(piece, first, count, stencil, density, dt, settings);
+    taken +=
+        accelerate_points(piece, first, count, stencil, density, dt, settings, [](int, const PointMotion<Dim>&) {});
   });
   return taken;
 }
@@ -175,8 +186,9 @@ double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const
                            double density, double dt, SpeedLimits& speeds) {
   double taken = 0, fastest = speeds.point * speeds.point;
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    taken += gather_velocity(piece, first, count, stencil, density, dt, settings);
-    fastest = move(piece.points, first, count, stencil, piece.nodes.motion.data(), dt, fastest);
+    taken += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto& m) {
+      fastest = move(piece.points, first + lane, m, dt, fastest);
+    });
   });
   speeds.point = std::sqrt(fastest);
   return taken;
@@ -187,7 +199,8 @@ void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Tran
                       double density) {
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
+    for (int lane = 0; lane < count; ++lane)
+      scatter_momentum(piece.points, first + lane, stencil, lane, density, piece.nodes.velocity.data());
   });
 }
 
@@ -197,8 +210,9 @@ double accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, co
   double taken = 0;
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    taken += gather_velocity(piece, first, count, stencil, density, dt, settings);
-    scatter_momentum(piece.points, first, count, stencil, density, piece.nodes.velocity.data());
+    taken += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto&) {
+      scatter_momentum(piece.points, first + lane, stencil, lane, density, piece.nodes.velocity.data());
+    });
   });
   return taken;
 }
@@ -261,14 +275,18 @@ template <int Dim>
 std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>& piece, const Lattice<Dim>& lattice,
                                                              const TransferSettings<Dim>& settings) {
   std::vector<std::array<double, spin_size<Dim>>> inertia(piece.points.size());
-  for_moving_piece(piece, lattice, settings,
-                   [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
-                     if constexpr (Stencil<Dim, Shape>::spinning)
-                       for (int lane = 0; lane < count; ++lane)
-                         for_spins<Dim>([&](int s, int i, int j) {
-                           inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
-                         });
-                   });
+  Box<Dim> everywhere;  // the points may have moved since the piece's own box was laid out
+  for (int d = 0; d < Dim; ++d) everywhere.lower[d] = -2, everywhere.upper[d] = lattice.cells()[d] + 3;
+  with_moving_shape(settings, [&](const auto& shape) {
+    for_chunks(piece.points, lattice, everywhere, shape,
+               [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
+                 if constexpr (Stencil<Dim, Shape>::spinning)
+                   for (int lane = 0; lane < count; ++lane)
+                     for_spins<Dim>([&](int s, int i, int j) {
+                       inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
+                     });
+               });
+  });
   return inertia;
 }
 

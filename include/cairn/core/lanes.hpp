@@ -31,7 +31,9 @@ inline void store4(double* p, Lanes4 a) {
   using Aliased = double __attribute__((vector_size(32), may_alias));
   *reinterpret_cast<Aliased*>(p) = a;
 }
-inline Lanes broadcast(double a) { return Lanes{} + a; }
+// a - 0 rather than a + 0, which is not a for -0 and costs an addition.
+inline Lanes broadcast(double a) { return a - Lanes{}; }
+inline Lanes4 broadcast4(double a) { return a - Lanes4{}; }
 
 inline double select(bool c, double a, double b) { return c ? a : b; }
 inline Lanes select(LaneInts c, Lanes a, Lanes b) { return c ? a : b; }
@@ -47,6 +49,11 @@ inline Lanes square_root(Lanes a) {
 template <class T>
 inline T maximum(T a, T b) {
   return select(a > b, a, b);
+}
+
+inline Lanes clamp(Lanes a, double low, double high) {
+  a = select(a < low, broadcast(low), a);
+  return select(a > high, broadcast(high), a);
 }
 
 inline double round_down(double a) { return std::floor(a); }

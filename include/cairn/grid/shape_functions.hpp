@@ -50,18 +50,12 @@ struct GimpShape {
     const double l = half[d], scale = 0.5 / l;
     for (int k = 0; k < nodes; ++k) {
       const Lanes r = xi - first - static_cast<double>(k);
-      const Lanes a = clamp(r - l), b = clamp(r + l);
+      const Lanes a = clamp(r - l, -1.0, 1.0), b = clamp(r + l, -1.0, 1.0);
       const Lanes absolute_a = absolute(a), absolute_b = absolute(b);
       // The hat's integral is 1/2 + u - u|u|/2 on [-1, 1].
       value[k] = scale * ((b - 0.5 * b * absolute_b) - (a - 0.5 * a * absolute_a));
       slope[k] = scale * (absolute_a - absolute_b);
     }
-  }
-
- private:
-  static Lanes clamp(Lanes u) {
-    u = select(u > 1.0, Lanes{} + 1.0, u);
-    return select(u < -1.0, Lanes{} - 1.0, u);
   }
 };
 
@@ -96,7 +90,24 @@ struct Spinning : Shape {
   static constexpr bool spinning = true;
 };
 
-/// Weights of eight points on the nodes of a box.
+/// What the weights of a row of nodes along x have in common: products over the other directions.
+template <int Dim>
+struct RowWeights {
+  double value;
+  double slope[Dim];  // with the slope in place of the value along direction d > 0 [1/m]
+  double arm[Dim];    // node minus point along direction d > 0 [m], with spin
+};
+
+/// The factors of one point's weights along x.
+template <int n>
+struct AlongX {
+  double value[n];
+  double slope[n];  // [1/m]
+  double lever[n];  // value times node minus point [m], with spin
+};
+
+/// Weights of eight points on the nodes of a box. They are products, so that sums over the nodes of a point are done
+/// row by row: along x first, then times what the row has in common.
 template <int Dim, class Shape>
 struct Stencil {
   static constexpr int n = Shape::nodes;
@@ -110,13 +121,17 @@ struct Stencil {
   int stride[3];
   double inverse_spacing[Dim];  // [1/m]
 
-  /// `x[d]` points to the positions along d [m], on a 64-byte boundary.
+  /// `x[d]` points to the positions along d [m], on a 64-byte boundary. The box holds all nodes of the points.
+  ///
+  /// A point within a rounding error of where a shape function takes up the next node may do so or not, with the same
+  /// weights. The compiler chooses how an expression is rounded at every place anew, so that whoever made the box may
+  /// have chosen the other way: a node taken here lies in the box in any case.
   Stencil(const Lattice<Dim>& lattice, const Shape& shape, const Box<Dim>& box, const double* const (&x)[Dim]) {
     Lanes offset{};
     for (int d = 0; d < Dim; ++d) {
       stride[d] = box.stride(d), inverse_spacing[d] = lattice.inverse_spacing()[d];
       const Lanes xi = (load(x[d]) - lattice.lower()[d]) * lattice.inverse_spacing()[d];
-      const Lanes start = Shape::first_node(xi);
+      const Lanes start = clamp(Shape::first_node(xi), box.lower[d], box.upper[d] - n);
       Lanes v[n], s[n];
       shape.evaluate(d, xi, start, v, s);
       for (int k = 0; k < n; ++k) {
@@ -137,22 +152,24 @@ struct Stencil {
     store(first, offset);
   }
 
-  /// Calls f(offset, weight, gradient[Dim]), or f(offset, weight, gradient[Dim], arm[Dim]), for every node of the point
-  /// in `lane`.
+  AlongX<n> along_x(int lane) const {
+    AlongX<n> x;
+    for (int i = 0; i < n; ++i) {
+      x.value[i] = value[0][i][lane], x.slope[i] = slope[0][i][lane];
+      if constexpr (spinning) x.lever[i] = value[0][i][lane] * arm[0][i][lane];
+    }
+    return x;
+  }
+
+  /// Calls f(offset of the first node, weights) for every row along x of the nodes of the point in `lane`.
   template <class F>
-  void for_nodes(int lane, F&& f) const {
+  void for_rows(int lane, F&& f) const {
     const int origin = static_cast<int>(first[lane]);
+    const auto arm_of = [&](int d, int k) { return spinning ? arm[spinning ? d : 0][k][lane] : 0.0; };
     if constexpr (Dim == 2) {
 #pragma GCC unroll 4
-      for (int j = 0; j < n; ++j) {
-        const double vy = value[1][j][lane], sy = slope[1][j][lane];
-#pragma GCC unroll 4
-        for (int i = 0; i < n; ++i) {
-          const double vx = value[0][i][lane];
-          const double gradient[2] = {slope[0][i][lane] * vy, vx * sy};
-          call(f, origin + j * stride[1] + i, vx * vy, gradient, lane, {i, j});
-        }
-      }
+      for (int j = 0; j < n; ++j)
+        f(origin + j * stride[1], RowWeights<2>{value[1][j][lane], {0, slope[1][j][lane]}, {0, arm_of(1, j)}});
     } else {
 #pragma GCC unroll 4
       for (int k = 0; k < n; ++k) {
@@ -160,28 +177,24 @@ struct Stencil {
 #pragma GCC unroll 4
         for (int j = 0; j < n; ++j) {
           const double vy = value[1][j][lane];
-          const double vyz = vy * vz, syz = slope[1][j][lane] * vz, vsz = vy * sz;
-#pragma GCC unroll 4
-          for (int i = 0; i < n; ++i) {
-            const double vx = value[0][i][lane];
-            const double gradient[3] = {slope[0][i][lane] * vyz, vx * syz, vx * vsz};
-            call(f, origin + k * stride[2] + j * stride[1] + i, vx * vyz, gradient, lane, {i, j, k});
-          }
+          f(origin + k * stride[2] + j * stride[1],
+            RowWeights<3>{vy * vz, {0, slope[1][j][lane] * vz, vy * sz}, {0, arm_of(1, j), arm_of(2, k)}});
         }
       }
     }
   }
 
- private:
+  /// Calls f(offset, weight, gradient[Dim]) for every node of the point in `lane`.
   template <class F>
-  void call(F& f, int node, double weight, const double (&gradient)[Dim], int lane, const Index<Dim>& at) const {
-    if constexpr (std::is_invocable_v<F&, int, double, const double(&)[Dim], const double(&)[Dim]>) {
-      double arms[Dim];
-      for (int d = 0; d < Dim; ++d) arms[d] = arm[d][at[d]][lane];
-      f(node, weight, gradient, arms);
-    } else {
-      f(node, weight, gradient);
-    }
+  void for_nodes(int lane, F&& f) const {
+    const auto x = along_x(lane);
+    for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      for (int i = 0; i < n; ++i) {
+        double gradient[Dim] = {x.slope[i] * row.value};
+        for (int d = 1; d < Dim; ++d) gradient[d] = x.value[i] * row.slope[d];
+        f(node + i, x.value[i] * row.value, gradient);
+      }
+    });
   }
 };
 
