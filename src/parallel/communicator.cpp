@@ -11,7 +11,34 @@ namespace {
 
 constexpr int exchange_tag = 11;
 
+/// Keeps what MPI may still read or write until the program ends.
+template <class T>
+void keep_to_the_end(T buffers) {
+  static std::vector<T> kept;
+  kept.push_back(std::move(buffers));
+}
+
 }  // namespace
+
+bool wait_or_leave(std::span<MPI_Request> requests) {
+  constexpr double patience = 1;  // [s]
+  const bool failing = std::uncaught_exceptions() > 0;
+  int done = 0;
+  for (const double start = MPI_Wtime(); !done && !(failing && MPI_Wtime() - start > patience);)
+    MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+  return done != 0;
+}
+
+void MaximumReduction::start(std::span<const double> mine, MPI_Comm comm) {
+  std::copy(mine.begin(), mine.end(), mine_.begin());
+  MPI_Iallreduce(mine_.data(), largest_.data(), static_cast<int>(mine_.size()), MPI_DOUBLE, MPI_MAX, comm, &request_);
+}
+
+MaximumReduction::~MaximumReduction() {
+  if (wait_or_leave({&request_, 1})) return;
+  keep_to_the_end(std::move(mine_));
+  keep_to_the_end(std::move(largest_));
+}
 
 NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours)
     : comm_(comm),
@@ -22,16 +49,7 @@ NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours)
 }
 
 NeighbourExchange::~NeighbourExchange() {
-  if (std::uncaught_exceptions() == 0) {
-    wait();
-    return;
-  }
-  // On the way out of an error of this rank alone nobody may be there to receive what was sent.
-  constexpr double patience = 1;  // [s]
-  int sent = 0;
-  for (const double start = MPI_Wtime(); !sent && MPI_Wtime() - start < patience;)
-    MPI_Testall(static_cast<int>(requests_.size()), requests_.data(), &sent, MPI_STATUSES_IGNORE);
-  if (!sent) new std::vector<Message>(std::move(outgoing_));  // kept for MPI to the end
+  if (!wait_or_leave(requests_)) keep_to_the_end(std::move(outgoing_));
 }
 
 std::size_t NeighbourExchange::slot(int rank) const {

@@ -59,7 +59,7 @@ Index<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& latt
 }  // namespace
 
 template <int Dim>
-void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice) {
+void Migration<Dim>::collect_piece(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice) {
   Points<Dim>& points = piece.points;
   if (all_inside(points, lattice, patch.id)) return;
   std::vector<int> staying;
@@ -96,12 +96,14 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
 }
 
 template <int Dim>
-void Migration<Dim>::start(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice) {
+void Migration<Dim>::begin() {
   messages_.begin();
   failure_.clear();
-  for (auto& patch : patches)
-    for (auto& piece : patch.pieces) collect(patch, piece, lattice);
-  messages_.start();
+}
+
+template <int Dim>
+void Migration<Dim>::collect(Patch<Dim>& patch, const Lattice<Dim>& lattice) {
+  for (auto& piece : patch.pieces) collect_piece(patch, piece, lattice);
 }
 
 template <int Dim>

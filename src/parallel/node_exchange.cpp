@@ -5,13 +5,33 @@
 namespace cairn {
 namespace {
 
+/// Calls f with how many numbers of a node are used, as a constant: loops of a few numbers are unrolled.
+template <class F>
+void with_constant(int used, F&& f) {
+  switch (used) {
+    case 2:  // a vector in 2D
+      return f(std::integral_constant<int, 2>{});
+    case 3:
+      return f(std::integral_constant<int, 3>{});
+    case 6:  // sums in 2D
+      return f(std::integral_constant<int, 6>{});
+    case 8:
+      return f(std::integral_constant<int, 8>{});
+    default:
+      return f(used);
+  }
+}
+
 /// Copies `used` of every `width` numbers of the nodes of `box` to a message.
 template <int Dim>
 void pack(const NodeBox<Dim>& nodes, const Box<Dim>& box, const NodeQuantity<Dim>& q, double* to) {
   const double* values = (nodes.*q.values).data();
-  for_each_row(box, nodes.box, [&](int first, int n) {
-    for (int i = 0; i < n; ++i, to += q.used)
-      std::copy_n(values + static_cast<std::size_t>(first + i) * q.width, q.used, to);
+  with_constant(q.used, [&](auto used) {
+    for_each_row(box, nodes.box, [&](int first, int n) {
+      const double* from = values + static_cast<std::size_t>(first) * q.width;
+      for (int i = 0; i < n; ++i, from += q.width, to += used)
+        for (int c = 0; c < used; ++c) to[c] = from[c];
+    });
   });
 }
 
@@ -19,11 +39,31 @@ void pack(const NodeBox<Dim>& nodes, const Box<Dim>& box, const NodeQuantity<Dim
 template <int Dim>
 const double* unpack(NodeBox<Dim>& nodes, const Box<Dim>& box, const NodeQuantity<Dim>& q, const double* from) {
   double* values = (nodes.*q.values).data();
-  for_each_row(box, nodes.box, [&](int first, int n) {
-    for (int k = 0; k < n; ++k)
-      for (int c = 0; c < q.used; ++c) values[static_cast<std::size_t>(first + k) * q.width + c] += *from++;
+  with_constant(q.used, [&](auto used) {
+    for_each_row(box, nodes.box, [&](int first, int n) {
+      double* to = values + static_cast<std::size_t>(first) * q.width;
+      for (int i = 0; i < n; ++i, from += used, to += q.width)
+        for (int c = 0; c < used; ++c) to[c] += from[c];
+    });
   });
   return from;
+}
+
+/// Makes room for the nodes of `box`, which holds that of the nodes; the new ones have zeros.
+template <int Dim>
+void widen(NodeBox<Dim>& nodes, const Box<Dim>& box, const std::vector<NodeQuantity<Dim>>& quantities) {
+  for (const auto& q : quantities) {
+    AlignedDoubles& values = nodes.*q.values;
+    const AlignedDoubles old = values;
+    const double* from = old.data();
+    values.assign(box.size() * q.width, 0.0);
+    for_each_row(nodes.box, box, [&](int first, int n) {
+      std::copy_n(from, static_cast<std::size_t>(n) * q.width,
+                  values.data() + static_cast<std::size_t>(first) * q.width);
+      from += static_cast<std::size_t>(n) * q.width;
+    });
+  }
+  nodes.box = box;
 }
 
 template <int Dim>
@@ -152,23 +192,27 @@ void NodeExchange<Dim>::add_to_piece(Piece<Dim>& piece, int links_before, std::s
   Box<Dim> box = nodes.box;
   if (in_.with_boxes)
     for (const Part& part : parts) box = hull(box, part.box);
-  const bool in_place = box == nodes.box && parts.front().link >= links_before;
-  if (in_place) {  // nothing comes before the own contribution, which is there already
-    for (const Part& part : parts) add_part(nodes, part);
-    return;
-  }
-  const Box<Dim> own = nodes.own;
-  std::vector<AlignedDoubles> kept;
-  for (const auto& q : in_.quantities) {
-    kept.emplace_back(own.size() * q.used);
-    pack(nodes, own, q, kept.back().data());
-    (nodes.*q.values).assign(box.size() * q.width, 0.0);
-  }
-  nodes.box = box;
-  auto part = parts.begin();
-  for (; part != parts.end() && part->link < links_before; ++part) add_part(nodes, *part);
-  for (std::size_t i = 0; i < in_.quantities.size(); ++i) unpack(nodes, own, in_.quantities[i], kept[i].data());
-  for (; part != parts.end(); ++part) add_part(nodes, *part);
+  if (!(box == nodes.box)) widen(nodes, box, in_.quantities);
+  const auto own_place =
+      std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.link >= links_before; });
+  const auto meets_another = [&](const Part& p) {
+    return std::any_of(parts.begin(), own_place,
+                       [&](const Part& other) { return &other != &p && !intersection(p.box, other.box).empty(); });
+  };
+  std::vector<AlignedDoubles> own;
+  // a + own = own + a: only where several contributions come before the own one, which is there already, does it have
+  // to wait.
+  const bool own_waits = std::any_of(parts.begin(), own_place, meets_another);
+  if (own_waits)
+    for (const auto& q : in_.quantities) {
+      own.emplace_back(nodes.own.size() * q.used);
+      pack(nodes, nodes.own, q, own.back().data());
+      std::fill((nodes.*q.values).begin(), (nodes.*q.values).end(), 0.0);
+    }
+  for (auto part = parts.begin(); part != own_place; ++part) add_part(nodes, *part);
+  if (own_waits)
+    for (std::size_t i = 0; i < own.size(); ++i) unpack(nodes, nodes.own, in_.quantities[i], own[i].data());
+  for (auto part = own_place; part != parts.end(); ++part) add_part(nodes, *part);
 }
 
 template <int Dim>

@@ -264,7 +264,7 @@ void Simulation<Dim>::restore(const Checkpoint& from) {
   connect_patches();
   const StepState& state = from.state().step;
   time_ = state.time, dt_ = state.dt, steps_ = state.steps;
-  speed_result_[0] = state.wave_speed, speed_result_[1] = state.point_speed;
+  maxima_[0] = state.wave_speed, maxima_[1] = state.point_speed;
   speeds_ = {};
 }
 
@@ -285,15 +285,13 @@ void Simulation<Dim>::place_points(const Case& c) {
     if (owner_[id] == rank_) filler.fill(*patch++, first_id);
   connect_patches();
 
-  for_patches([&](std::size_t, Patch<Dim>& patch) {
-    for (const auto& piece : patch.pieces) {
+  for (const auto& patch : patches_)
+    for (const auto& piece : patch.pieces)
       for (int p = 0; p < piece.points.size(); ++p) {
         double squared = 0;
         for (int d = 0; d < Dim; ++d) squared += std::pow(piece.points.column(PointColumns<Dim>::velocity + d)[p], 2);
         speeds_.point = std::max(speeds_.point, std::sqrt(squared));
       }
-    }
-  });
   start_speed_reduction();
 }
 

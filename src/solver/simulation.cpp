@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <set>
 
 #include "cairn/core/error.hpp"
@@ -12,12 +13,31 @@
 namespace cairn {
 namespace {
 
-/// Calls f(piece) for every piece of a patch, whose points are fetched a piece ahead.
+constexpr int all_columns = std::numeric_limits<int>::max();
+
+/// Columns [first, last) of the points.
+struct ColumnRange {
+  int first, last;
+};
+
+/// Calls f(piece) for every piece of a patch. The columns named, those that f uses, are fetched a piece ahead.
 template <int Dim, class F>
-void for_pieces(Patch<Dim>& patch, F&& f) {
+void for_pieces(Patch<Dim>& patch, std::initializer_list<ColumnRange> columns, F&& f) {
+  const auto fetch_points = [&](const Points<Dim>& points) {
+    for (const auto& [first, last] : columns) points.fetch(first, std::min(last, points.columns()));
+  };
   for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
-    if (k + 1 < patch.pieces.size()) patch.pieces[k + 1].points.prefetch();
+    if (k + 1 < patch.pieces.size()) fetch_points(patch.pieces[k + 1].points);
     f(patch.pieces[k]);
+  }
+}
+
+/// Fetches what contact and integration read of the nodes.
+template <int Dim>
+void fetch_nodes(const Patch<Dim>& patch) {
+  for (const auto& piece : patch.pieces) {
+    fetch(piece.nodes.sums.data(), piece.nodes.sums.size());
+    fetch(piece.nodes.force.data(), piece.nodes.force.size());
   }
 }
 
@@ -56,12 +76,12 @@ void Simulation<Dim>::step(double longest) {
       accelerate_points(patch);
     });
   }
-  for_patches([&](std::size_t p, P& patch) {
+  migrate_after([&](std::size_t p, P& patch) {
     again ? project_again(p, patch) : update_momentum(p, patch);
     finish_points(patch, share);
   });
   look_for_fault(1);
-  migrate_points();
+  receive_points();
   time_ += dt_;
   ++steps_;
   if (parallel_.balance_every > 0 && steps_ % parallel_.balance_every == 0) balance();
@@ -70,18 +90,19 @@ void Simulation<Dim>::step(double longest) {
 template <int Dim>
 void Simulation<Dim>::choose_time_step(double longest) {
   finish_speed_reduction();
-  dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * lattice_.smallest_spacing() / (speed_result_[0] + speed_result_[1]);
+  dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * lattice_.smallest_spacing() / (maxima_[0] + maxima_[1]);
   if (!(dt_ > 0) || !std::isfinite(dt_))
     throw RunError(fmt::format("step {}: the time step collapsed (wave speed {} m/s, point speed {} m/s)", steps_ + 1,
-                               speed_result_[0], speed_result_[1]));
+                               maxima_[0], maxima_[1]));
   // Reach the end exactly, without a last step of a rounding error's length.
   if (dt_ * (1 + 1e-9) >= longest) dt_ = longest;
 }
 
 template <int Dim>
 void Simulation<Dim>::project_points(Patch<Dim>& patch) {
+  using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::project);
-  for_pieces(patch, [&](Piece<Dim>& piece) {
+  for_pieces(patch, {{C::position, C::state}}, [&](Piece<Dim>& piece) {
     lay_out_nodes(piece, lattice_, transfer_);
     project(piece, lattice_, transfer_, material_of(piece).density);
   });
@@ -91,6 +112,7 @@ template <int Dim>
 void Simulation<Dim>::contact_before_update(std::size_t p, Patch<Dim>& patch) {
   {
     const auto time = timers_.measure(Stage::exchange);
+    fetch_nodes(patch);
     exchange_->add(patch, p);
     mirror_sums(patch, lattice_, faces_);
   }
@@ -103,10 +125,11 @@ void Simulation<Dim>::contact_before_update(std::size_t p, Patch<Dim>& patch) {
 
 template <int Dim>
 void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
+  using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::stress);
   for (auto& piece : patch.pieces) velocity_from_sums(piece);
   constrain_velocity(patch, lattice_, faces_, bodies_, false);
-  for_pieces(patch, [&](Piece<Dim>& piece) {
+  for_pieces(patch, {{C::position, C::velocity}, {C::deformation, all_columns}}, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
     if (is_rigid(piece))
       std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
@@ -118,6 +141,7 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
 template <int Dim>
 void Simulation<Dim>::complete_forces(std::size_t p, Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::exchange);
+  fetch_nodes(patch);
   exchange_->add(patch, p);
   mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::force);
 }
@@ -136,8 +160,9 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
 
 template <int Dim>
 void Simulation<Dim>::accelerate_points(Patch<Dim>& patch) {
+  using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::update);
-  for_pieces(patch, [&](Piece<Dim>& piece) {
+  for_pieces(patch, {{C::position, C::deformation}, {C::volume, C::state}}, [&](Piece<Dim>& piece) {
     const double density = material_of(piece).density;
     if (is_rigid(piece))
       project_momentum(piece, lattice_, transfer_, density);
@@ -164,12 +189,14 @@ void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
 /// The last pass over the points: what is left to do with them, and they move.
 template <int Dim>
 void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
-  const auto time = timers_.measure(solver_.stress_update == StressUpdate::first ? Stage::update : Stage::stress);
-  for_pieces(patch, [&](Piece<Dim>& piece) {
+  using C = PointColumns<Dim>;
+  const bool strained = solver_.stress_update == StressUpdate::first;
+  const auto time = timers_.measure(strained ? Stage::update : Stage::stress);
+  for_pieces(patch, {{C::position, strained ? C::deformation : all_columns}}, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
     if (is_rigid(piece)) {
       move_rigid(piece);
-    } else if (solver_.stress_update == StressUpdate::first) {
+    } else if (strained) {
       patch.ledger.numerical_dissipation +=
           accelerate_and_move(piece, lattice_, transfer_, material.density, dt_, speeds_);
     } else {
@@ -206,9 +233,8 @@ void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
 }
 
 template <int Dim>
-void Simulation<Dim>::migrate_points() {
+void Simulation<Dim>::receive_points() {
   const auto time = timers_.measure(Stage::migrate);
-  migration_->start(patches_, lattice_);
   start_speed_reduction();
   migration_->finish(patches_);
   if ((steps_ + 1) % sort_interval == 0)
@@ -228,28 +254,27 @@ void Simulation<Dim>::look_for_fault(int urgency) {
 
 template <int Dim>
 void Simulation<Dim>::start_speed_reduction() {
-  speed_message_[0] = speeds_.wave, speed_message_[1] = speeds_.point;
   if (fault_urgency_ == 0 && !migration_->failure().empty()) fault_urgency_ = 1, fault_ = migration_->failure();
-  speed_message_[2] = fault_urgency_;
   const Notice notice = ask_ ? ask_() : Notice{};
-  speed_message_[3] = notice.stop, speed_message_[4] = notice.wall;
-  MPI_Iallreduce(speed_message_, speed_result_, speed_size, MPI_DOUBLE, MPI_MAX, comm_, &speed_request_);
+  const double mine[speed_size] = {speeds_.wave, speeds_.point, static_cast<double>(fault_urgency_), notice.stop,
+                                   notice.wall};
+  maxima_.start(mine, comm_);
   speeds_ = {};
 }
 
 template <int Dim>
 StepState Simulation<Dim>::step_state() {
   finish_speed_reduction();
-  return {time_, dt_, speed_result_[0], speed_result_[1], steps_};
+  return {time_, dt_, maxima_[0], maxima_[1], steps_};
 }
 
 template <int Dim>
 void Simulation<Dim>::finish_speed_reduction() {
-  if (speed_request_ == MPI_REQUEST_NULL) return;  // done already
-  MPI_Wait(&speed_request_, MPI_STATUS_IGNORE);
-  if (speed_result_[2] > 0)
-    throw RunError(fmt::format("step {}: {}", steps_,
-                               common_error(comm_, fault_urgency_ == speed_result_[2] ? fault_ : std::string())));
+  if (!maxima_.under_way()) return;
+  maxima_.finish();
+  if (maxima_[2] > 0)
+    throw RunError(
+        fmt::format("step {}: {}", steps_, common_error(comm_, fault_urgency_ == maxima_[2] ? fault_ : std::string())));
 }
 
 template <int Dim>

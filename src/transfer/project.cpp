@@ -75,15 +75,28 @@ void project_extras(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transf
   });
 }
 
+/// Smallest and largest of n > 0 numbers that begin on a 64-byte boundary.
+std::pair<double, double> extremes(const double* x, int n) {
+  Lanes low = broadcast(x[0]), high = low;
+  int p = 0;
+  for (; p + lane_count <= n; p += lane_count) {
+    const Lanes v = load(x + p);
+    low = select(v < low, v, low), high = select(v > high, v, high);
+  }
+  double least = x[0], most = x[0];
+  for (int lane = 0; lane < lane_count; ++lane) least = std::min(least, low[lane]), most = std::max(most, high[lane]);
+  for (; p < n; ++p) least = std::min(least, x[p]), most = std::max(most, x[p]);
+  return {least, most};
+}
+
 /// Nodes that the points touch: from their extreme positions. Empty without points.
 template <int Dim>
 Box<Dim> touched_nodes(const Points<Dim>& points, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings) {
   Box<Dim> box;
   if (points.size() == 0) return box;
   for (int d = 0; d < Dim; ++d) {
-    const double* x = points.column(d);
-    const auto [low, high] = std::minmax_element(x, x + points.size());
-    const double first = lattice.scaled(d, *low), last = lattice.scaled(d, *high);
+    const auto [low, high] = extremes(points.column(d), points.size());
+    const double first = lattice.scaled(d, low), last = lattice.scaled(d, high);
     const auto widen = [&]<class Shape>(const Shape&) {
       const int lower = static_cast<int>(Shape::first_node(first)),
                 upper = static_cast<int>(Shape::first_node(last)) + Shape::nodes;

@@ -225,14 +225,14 @@ void integrate(Piece<Dim>& piece, double dt) {
   resize_exactly(nodes.motion, nodes.box.size() * M::width);
   for (std::size_t node = 0; node < nodes.box.size(); ++node) {
     const double* sums = nodes.sums.data() + node * N::width;
-    const double* force = nodes.force.data() + node * vector_width;
-    double* motion = nodes.motion.data() + node * M::width;
+    const double* f = nodes.force.data() + node * vector_width;
+    const double* p = sums + N::momentum;
     const double inverse = sums[N::mass] > 0 ? 1.0 / sums[N::mass] : 0.0;
-    for (int d = 0; d < Dim; ++d) {
-      motion[M::acceleration + d] = force[d] * inverse;
-      motion[M::velocity + d] = (sums[N::momentum + d] + dt * force[d]) * inverse;
-    }
-    for (int d = M::used; d < M::width; ++d) motion[d] = 0;
+    if constexpr (Dim == 2)
+      store4(nodes.motion.data() + node * M::width, Lanes4{f[0], f[1], p[0] + dt * f[0], p[1] + dt * f[1]} * inverse);
+    else
+      store(nodes.motion.data() + node * M::width,
+            Lanes{f[0], f[1], f[2], p[0] + dt * f[0], p[1] + dt * f[1], p[2] + dt * f[2], 0, 0} * inverse);
   }
 }
 
@@ -243,9 +243,9 @@ void velocity_from_sums(Piece<Dim>& piece) {
   resize_exactly(nodes.velocity, nodes.box.size() * vector_width);
   for (std::size_t node = 0; node < nodes.box.size(); ++node) {
     const double* sums = nodes.sums.data() + node * N::width;
-    double* velocity = nodes.velocity.data() + node * vector_width;
+    const double* p = sums + N::momentum;
     const double inverse = sums[N::mass] > 0 ? 1.0 / sums[N::mass] : 0.0;
-    for (int d = 0; d < vector_width; ++d) velocity[d] = d < Dim ? sums[N::momentum + d] * inverse : 0.0;
+    store4(nodes.velocity.data() + node * vector_width, Lanes4{p[0], p[1], Dim == 3 ? p[2] : 0, 0} * inverse);
   }
 }
 

@@ -85,8 +85,7 @@ void check_migration(const Lattice<Dim>& lattice) {
       for (int p = 0; p < piece.points.size(); ++p)
         for (int d = 0; d < Dim; ++d) piece.points.column(d)[p] = to.at(piece.points.ids()[p])[d];
     });
-    w->migration->start(w->patches, lattice);
-    w->migration->finish(w->patches);
+    w->migrate();
     EXPECT_EQ(w->migration->failure(), "");
   }
   expect_arrived(world, points, to);
@@ -111,8 +110,7 @@ std::string failure_of(const Lattice<2>& lattice, const Vec<2>& x, std::int64_t*
   world.for_pieces([&](auto& piece) {
     for (int d = 0; d < 2; ++d) piece.points.column(d)[0] = x[d];
   });
-  world.migration->start(world.patches, lattice);
-  world.migration->finish(world.patches);
+  world.migrate();
   *points_left = 0;
   for (const auto& patch : world.patches) *points_left += patch.point_count();
   MPI_Allreduce(MPI_IN_PLACE, points_left, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
@@ -147,8 +145,7 @@ TEST(Migration, RoundingErrorsAtAPeriodicBoundaryDoNoHarm) {
     const std::vector<GlobalPoint<2>> points = {{0, 0, random_point<2>(random, Vec<2>(x < 0.3 ? 0.1 : 0.6, 0.1), 1)}};
     World<2> world(lattice, points, MPI_COMM_WORLD);
     world.for_pieces([&](auto& piece) { piece.points.column(0)[0] = x; });
-    world.migration->start(world.patches, lattice);
-    world.migration->finish(world.patches);
+    world.migrate();
     EXPECT_EQ(world.migration->failure(), "");
     world.for_pieces([&](auto& piece) {
       if (piece.points.size() == 0) return;

@@ -103,6 +103,13 @@ struct World {
     points.ids()[p] = point.id;
     points.images()[p] = {};
   }
+  /// Points that left their patch go to the others.
+  void migrate() {
+    migration->begin();
+    for (auto& p : patches) migration->collect(p, lattice);
+    migration->start();
+    migration->finish(patches);
+  }
   template <class F>
   void for_pieces(F&& f) {
     for (auto& patch : patches)

@@ -47,10 +47,9 @@ class Points {
   std::vector<Image>& images() { return images_; }
   const std::vector<Image>& images() const { return images_; }
 
-  /// Asks for the columns to come to the cache: there are too many short ones for the processor to foresee.
-  void prefetch() const {
-    constexpr std::size_t line = 64 / sizeof(double);
-    for (std::size_t i = 0; i < data_.size(); i += line) __builtin_prefetch(data_.data() + i, 1, 2);
+  /// Brings columns [first, last) to the cache: there are too many short ones for the processor to foresee.
+  void fetch(int first, int last) const {
+    for (int c = first; c < last; ++c) cairn::fetch(column(c), size_);
   }
 
   /// Changes the number of points; the first min(old, new) are kept, new ones are unset.

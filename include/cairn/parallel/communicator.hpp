@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "cairn/core/aligned.hpp"
@@ -34,6 +35,35 @@ class Message {
 /// Counts of what was sent, for the cost model.
 struct Traffic {
   std::int64_t messages = 0, bytes = 0;
+};
+
+/// Waits until all are done. On the way out of an error, which may be that of this rank alone, nobody may be there to
+/// answer: then for a second at the most. False where some are not done: what they send and receive must stay to the
+/// end.
+bool wait_or_leave(std::span<MPI_Request> requests);
+
+/// The largest of each of a few numbers over all ranks, found while other work is done.
+class MaximumReduction {
+ public:
+  explicit MaximumReduction(std::size_t size) : mine_(size, 0.0), largest_(size, 0.0) {}
+  ~MaximumReduction();
+  MaximumReduction(const MaximumReduction&) = delete;
+  MaximumReduction& operator=(const MaximumReduction&) = delete;
+  MaximumReduction(MaximumReduction&&) = delete;
+  MaximumReduction& operator=(MaximumReduction&&) = delete;
+
+  /// Starts with this rank's numbers, as many as at the construction. Collective, not while one is under way.
+  void start(std::span<const double> mine, MPI_Comm comm);
+  bool under_way() const { return request_ != MPI_REQUEST_NULL; }
+  /// Collective.
+  void finish() { MPI_Wait(&request_, MPI_STATUS_IGNORE); }
+  /// The numbers that the last `finish` found.
+  double operator[](std::size_t i) const { return largest_[i]; }
+  double& operator[](std::size_t i) { return largest_[i]; }
+
+ private:
+  std::vector<double> mine_, largest_;
+  MPI_Request request_ = MPI_REQUEST_NULL;
 };
 
 /// One message to and from each neighbouring rank, and one to itself that never leaves memory.

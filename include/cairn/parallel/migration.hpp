@@ -17,16 +17,20 @@ class Migration {
   /// \param owner  the rank of every patch; must outlive this object unchanged
   Migration(NeighbourExchange& messages, const std::vector<int>& owner) : messages_(messages), owner_(owner) {}
 
-  /// Sends the points that left. Pieces left without points stay as ghosts. A point that left the domain, is not finite
-  /// or moved further than a neighbouring patch stays where it is and is reported by `failure`.
-  void start(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice);
+  /// A migration: `begin`, `collect` for every patch that lies beside other ranks, `start`, `collect` for the rest
+  /// while the messages travel, `finish`.
+  void begin();
+  /// Takes out the points that left the patch. Pieces left without points stay as ghosts. A point that left the domain,
+  /// is not finite or moved further than a neighbouring patch stays where it is and is reported by `failure`.
+  void collect(Patch<Dim>& patch, const Lattice<Dim>& lattice);
+  void start() { messages_.start(); }
   /// Receives those that arrived.
   void finish(std::vector<Patch<Dim>>& patches);
-  /// What went wrong on this rank in the last `start`; empty if nothing.
+  /// What went wrong on this rank since `begin`; empty if nothing.
   const std::string& failure() const { return failure_; }
 
  private:
-  void collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice);
+  void collect_piece(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice);
 
   NeighbourExchange& messages_;
   const std::vector<int>& owner_;

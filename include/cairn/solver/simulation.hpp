@@ -73,7 +73,7 @@ class Simulation {
   /// What the ranks told each other in the last step, the same on all of them. Collective; throws as step_state().
   Notice notice() {
     finish_speed_reduction();
-    return {speed_result_[3], speed_result_[4]};
+    return {maxima_[3], maxima_[4]};
   }
 
   double time() const { return time_; }
@@ -116,7 +116,7 @@ class Simulation {
   void accelerate_points(Patch<Dim>& patch);
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
   void finish_points(Patch<Dim>& patch, double share);
-  void migrate_points();  // communicates
+  void receive_points();  // communicates
 
   void place_points(const Case& c);
   void restore(const Checkpoint& from);
@@ -125,9 +125,15 @@ class Simulation {
   void balance();                                              // (*)
 
   /// Calls f(position, patch) for every patch and notes the processor time that it takes.
-  template <class F>
-  void for_patches(F&& f) {
-    for (std::size_t p = 0; p < patches_.size(); ++p) timed(p, f);
+  /// Computes every patch: first those beside other ranks, after which `send` is called, so that messages travel while
+  /// the rest is computed.
+  template <class F, class Send>
+  void for_patches(F&& compute, Send&& send) {
+    for (const bool beside_others : {true, false}) {
+      for (std::size_t p = 0; p < patches_.size(); ++p)
+        if (beside_others_[p] == beside_others) compute(p, patches_[p]);
+      if (beside_others) send();
+    }
   }
   template <class F>
   void timed(std::size_t p, F&& f) {
@@ -136,20 +142,36 @@ class Simulation {
     f(p, patches_[p]);
     if (!empty) patches_[p].seconds += processor_seconds() - start;
   }
-  /// Computes every patch, and exchanges what it shares with its neighbours. Patches beside other ranks go first: their
-  /// messages travel while the rest is computed.
+  /// Computes every patch, and exchanges what it shares with its neighbours.
   template <class F>
   void exchange_after(F&& compute) {
-    for (const bool beside_others : {true, false}) {
-      for (std::size_t p = 0; p < patches_.size(); ++p) {
-        if (beside_others_[p] != beside_others) continue;
-        timed(p, compute);
-        const auto time = timers_.measure(Stage::exchange);
-        exchange_->put(patches_[p], p);
-      }
-      const auto time = timers_.measure(Stage::exchange);
-      beside_others ? exchange_->start() : exchange_->finish();
-    }
+    for_patches(
+        [&](std::size_t p, Patch<Dim>& patch) {
+          timed(p, compute);
+          const auto time = timers_.measure(Stage::exchange);
+          exchange_->put(patch, p);
+        },
+        [&] {
+          const auto time = timers_.measure(Stage::exchange);
+          exchange_->start();
+        });
+    const auto time = timers_.measure(Stage::exchange);
+    exchange_->finish();
+  }
+  /// Computes every patch for the last time in a step, and sends the points that left it.
+  template <class F>
+  void migrate_after(F&& compute) {
+    migration_->begin();
+    for_patches(
+        [&](std::size_t p, Patch<Dim>& patch) {
+          timed(p, compute);
+          const auto time = timers_.measure(Stage::migrate);
+          migration_->collect(patch, lattice_);
+        },
+        [&] {
+          const auto time = timers_.measure(Stage::migrate);
+          migration_->start();
+        });
   }
   void move_rigid(Piece<Dim>& piece);
   void look_for_fault(int urgency);
@@ -183,11 +205,10 @@ class Simulation {
   double seconds_balancing_ = 0;
   SpeedLimits speeds_;  // of this rank, in the step under way
   static constexpr int speed_size = 5;
-  double speed_message_[speed_size] = {}, speed_result_[speed_size] = {};  // wave, point, failure, stop, wall
-  int fault_urgency_ = 0;  // of this rank's first fault: the earlier its stage in the step, the more
+  MaximumReduction maxima_{speed_size};  // wave, point, failure, stop, wall
+  int fault_urgency_ = 0;                // of this rank's first fault: the earlier its stage in the step, the more
   std::string fault_;
   std::function<Notice()> ask_;
-  MPI_Request speed_request_ = MPI_REQUEST_NULL;
 };
 
 }  // namespace cairn
