@@ -69,13 +69,13 @@ def main() -> int:
     start = time.monotonic()
     runner = Runner(arguments.program, arguments.out, arguments.ranks, arguments.fresh)
     runs = all_runs(chosen, arguments.full)
-    folders, errors = execute(runner, runs, arguments.jobs, lambda line: print(line, flush=True))
+    folders, errors, processor = execute(runner, runs, arguments.jobs, lambda line: print(line, flush=True))
     outcomes = [evaluate(problem, folders, errors, arguments.out / "pictures") for problem in chosen]
     version = subprocess.run([arguments.program, "--version"], capture_output=True, text=True, check=False,
                              env=environment(1)).stdout.splitlines()
-    about = {"command": command(arguments), "wall": time.monotonic() - start,
-             "date": datetime.date.today().isoformat(), "program": version[0] if version else "unknown program",
-             "program_sha256": runner.identity}
+    about = {"command": command(arguments), "wall": time.monotonic() - start, "processor": processor,
+             "runs": len(runs), "date": datetime.date.today().isoformat(),
+             "program": version[0] if version else "unknown program", "program_sha256": runner.identity}
     report.write(outcomes, about, arguments.out, arguments.page)
     print("\n" + report.text(outcomes))
     for message in errors.values():

@@ -8,7 +8,7 @@ import math
 from pathlib import Path
 
 from validation.checks import Check
-from validation.suite import LITERAL, Outcome
+from validation.suite import FORMS, LITERAL, SETTINGS, Outcome
 
 HEADER = ["case", "quantity", "value", "expected", "error", "band", "pass"]
 
@@ -23,22 +23,45 @@ def as_markdown(rows: list[list[str]]) -> str:
     return "\n".join("| " + " | ".join(word.replace("|", "\\|") or " " for word in line) + " |" for line in lines)
 
 
-def literal_table(outcome: Outcome) -> list[list[str]]:
-    """What the papers' own forms give, one column each: the error where a value is expected, else the value."""
+Key = tuple[str, str]  # case and quantity
+
+
+def by_key(checks: list[Check]) -> dict[Key, Check]:
+    return {(check.case, check.quantity): check for check in checks}
+
+
+def in_forms(outcome: Outcome) -> dict[Key, Check]:
+    """The checks of the defaults that some other form repeats."""
+    wanted = {key for checks in outcome.forms.values() for key in by_key(checks)}
+    return {key: check for key, check in by_key(outcome.checks).items() if key in wanted}
+
+
+def forms_table(outcome: Outcome, forms: list[str]) -> list[list[str]]:
+    """What other forms give, one column each: the error where a value is expected, else the value."""
     def shown(check: Check | None) -> str:
         if check is None or not math.isfinite(check.value):
             return "failed"
         text = f"{check.value:.4g}" if check.error is None or not check.expected else f"{check.error:+.1%}"
         return text if check.passed else f"{text} (out)"
 
-    columns = {form: {(check.case, check.quantity): check for check in checks}
-               for form, checks in outcome.literal.items()}
-    wanted = {key for found in columns.values() for key in found if not key[1].startswith(("run failed", "no eval"))}
-    rows = [["case", "quantity", "default", *columns]]
-    for check in outcome.checks:
-        key = check.case, check.quantity
-        if key in wanted:
-            rows.append([*key, shown(check), *(shown(found.get(key)) for found in columns.values())])
+    columns = [by_key(outcome.forms[form]) for form in forms]
+    return [["case", "quantity", "default", *forms]] + [
+        [*key, shown(check), *(shown(column.get(key)) for column in columns)]
+        for key, check in in_forms(outcome).items()]
+
+
+def overview(outcomes: list[Outcome]) -> list[list[str]]:
+    """For each problem, how many of the bands that forms repeat the default misses, and each form."""
+    rows = [["problem", "bands", "default", *FORMS]]
+    for outcome in outcomes:
+        banded = {key for key, check in in_forms(outcome).items() if not check.recorded}
+        if not banded:
+            continue
+        def missed(checks: list[Check]) -> str:
+            found = by_key(checks)
+            return str(sum(key not in found or not found[key].passed for key in banded))
+        rows.append([outcome.problem.name, str(len(banded)), missed(outcome.checks),
+                     *(missed(outcome.forms[form]) if form in outcome.forms else "-" for form in FORMS)])
     return rows
 
 
@@ -61,17 +84,27 @@ def text(outcomes: list[Outcome]) -> str:
     return "\n\n".join([*parts, summary(outcomes)])
 
 
+def keys_of(forms: dict[str, dict]) -> str:
+    return "\n".join(f"- *{form}*: " + ", ".join(f"`{key}` = {value}".replace('"', "") for key, value in keys.items())
+                     for form, keys in forms.items())
+
+
+GROUPS = {"In the papers' own forms": LITERAL, "With other choices of the solver": SETTINGS}
+
+
 def markdown(outcomes: list[Outcome]) -> str:
     parts = [summary(outcomes) + "."]
+    if len(rows := overview(outcomes)) > 1:
+        parts += ["### Other forms and settings\n\nBands missed, of those of the runs that were repeated. The papers' "
+                  "own forms of contact:", keys_of(LITERAL), "and other choices of the solver:", keys_of(SETTINGS),
+                  as_markdown(rows)]
     for outcome in outcomes:
         parts.append(f"### {outcome.problem.title}\n\n`{outcome.problem.name}`; {outcome.problem.source}.")
         parts.append(as_markdown([HEADER] + [check.row() for check in outcome.checks]))
-        if outcome.literal:
-            forms = "; ".join(f"*{form}*: " + ", ".join(f"`{key}` = {value}".replace('"', "")
-                                                         for key, value in LITERAL[form].items())
-                              for form in outcome.literal)
-            parts.append(f"In the papers' own forms ({forms}); (out): outside the band of the default.")
-            parts.append(as_markdown(literal_table(outcome)))
+        for title, group in GROUPS.items():
+            if forms := [form for form in group if form in outcome.forms]:
+                parts += [f"{title}; (out): outside the band of the default.",
+                          as_markdown(forms_table(outcome, forms))]
     return "\n\n".join(parts) + "\n"
 
 
@@ -82,7 +115,7 @@ def as_json(outcomes: list[Outcome], about: dict) -> str:
 
     problems = [{"name": outcome.problem.name, "title": outcome.problem.title, "source": outcome.problem.source,
                  "checks": rows(outcome.checks),
-                 "literal": {form: rows(checks) for form, checks in outcome.literal.items()},
+                 "forms": {form: rows(checks) for form, checks in outcome.forms.items()},
                  "pictures": [path.name for path in outcome.pictures]} for outcome in outcomes]
     return json.dumps({"about": about, "problems": problems}, indent=1) + "\n"
 
@@ -91,7 +124,8 @@ def write(outcomes: list[Outcome], about: dict, out: Path, page: Path | None) ->
     """results.md and results.json in `out`; with a page, the tables between its two marks as well."""
     out.mkdir(parents=True, exist_ok=True)
     tables = markdown(outcomes)
-    head = f"`{about['command']}`, {about['date']}, {about['program']}: {about['wall']:.0f} s."
+    head = (f"`{about['command']}`, {about['date']}, {about['program']}: {about['runs']} runs, "
+            f"{about['processor'] / 60:.0f} minutes of processor time.")
     (out / "results.md").write_text(f"# Validation\n\n{head} {tables}", encoding="utf-8")
     (out / "results.json").write_text(as_json(outcomes, about), encoding="utf-8")
     if page:

@@ -26,6 +26,11 @@ LITERAL = {
                      "contact.departing_friction": '"printed"'},
 }
 
+# Other choices of the solver.
+SETTINGS = {update: {"solver.stress_update": f'"{update}"'} for update in ("first", "modified_last", "last")} | {
+    shape: {"solver.shape": f'"{shape}"'} for shape in ("linear", "bspline2")}
+FORMS = LITERAL | SETTINGS
+
 
 def nothing_drawn(_folders: Folders, _out: Path) -> list[Path]:
     return []
@@ -41,17 +46,17 @@ class Problem:
     runs: Callable[[bool], dict[str, Run]]
     checks: Callable[[Folders], list[Check]]
     draw: Callable[[Folders, Path], list[Path]] = nothing_drawn
-    literal: tuple[str, ...] = ()  # labels of the runs that are repeated in the papers' own forms
-    forms: tuple[str, ...] = tuple(LITERAL)
+    literal: tuple[str, ...] = ()  # labels of the runs that are repeated in other forms, the papers' own among them
+    forms: tuple[str, ...] = tuple(FORMS)
 
 
 @dataclasses.dataclass
 class Outcome:
-    """The checks of a problem, what the papers' own forms give instead, and its pictures."""
+    """The checks of a problem, what other forms give instead, and its pictures."""
 
     problem: Problem
     checks: list[Check]
-    literal: dict[str, list[Check]]  # by form
+    forms: dict[str, list[Check]]
     pictures: list[Path]
 
 
@@ -68,13 +73,14 @@ def all_runs(problems: list[Problem], full: bool) -> dict[tuple[str, str, str], 
         runs |= {(problem.name, "", label): run for label, run in own.items()}
         if full:
             runs |= {(problem.name, form, label): own[label].changed(changes)
-                     for form, changes in LITERAL.items() if form in problem.forms for label in problem.literal}
+                     for form, changes in FORMS.items() if form in problem.forms for label in problem.literal}
     return runs
 
 
-def execute(runner: Runner, runs: dict, jobs: int, say: Callable[[str], None]) -> tuple[dict, dict]:
-    """Makes all runs, `jobs` at a time; folders and error messages by (problem, form, label)."""
-    folders, errors = {}, {}
+def execute(runner: Runner, runs: dict, jobs: int, say: Callable[[str], None]) -> tuple[dict, dict, float]:
+    """Makes all runs, `jobs` at a time; folders and error messages by (problem, form, label), and the processor time of
+    all runs, also of those kept from before [s]."""
+    folders, errors, processor = {}, {}, 0.0
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         order = sorted(runs, key=lambda key: -runs[key].cost)
         waiting = {pool.submit(runner, folder_name(*key), runs[key]): key for key in order}
@@ -83,11 +89,12 @@ def execute(runner: Runner, runs: dict, jobs: int, say: Callable[[str], None]) -
             try:
                 done = job.result()
                 folders[key] = done.folder
-                how = "kept" if done.kept else f"{done.seconds:.1f} s"
+                processor += done.processor
+                how = "kept" if done.kept else f"{done.seconds:.1f} s, {done.processor:.1f} s of processor time"
             except RunFailed as error:
                 errors[key], how = str(error), "FAILED"
             say(f"[{count:{len(str(len(runs)))}}/{len(runs)}] {' | '.join(word for word in key if word)}: {how}")
-    return {key: folders[key] for key in runs if key in folders}, errors
+    return {key: folders[key] for key in runs if key in folders}, errors, processor
 
 
 def judge(problem: Problem, form: str, folders: dict, errors: dict) -> list[Check]:
@@ -103,12 +110,12 @@ def judge(problem: Problem, form: str, folders: dict, errors: dict) -> list[Chec
 
 
 def evaluate(problem: Problem, folders: dict, errors: dict, pictures: Path) -> Outcome:
-    forms = {form for name, form, _ in [*folders, *errors] if name == problem.name and form}
-    literal = {form: judge(problem, form, folders, errors) for form in LITERAL if form in forms}
+    made = {form for name, form, _ in [*folders, *errors] if name == problem.name and form}
+    forms = {form: judge(problem, form, folders, errors) for form in FORMS if form in made}
     own = {label: folder for (name, form, label), folder in folders.items() if name == problem.name and not form}
     found, drawn = judge(problem, "", folders, errors), []
     try:
         drawn = problem.draw(own, pictures) if own else []
     except Exception as error:  # as above
         found.append(Check(problem.name, f"no pictures: {error!r}", float("nan")))
-    return Outcome(problem, found, literal, drawn)
+    return Outcome(problem, found, forms, drawn)

@@ -12,13 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from harness import ROOT, fresh_folder
+from harness import PATIENCE, ROOT, fresh_folder
 
 sys.path.insert(0, str(ROOT / "scripts"))
 
-from validation import closed_forms, series  # noqa: E402
+from validation import closed_forms, report, series  # noqa: E402
 from validation.checks import Check, below, near, observed_order, record  # noqa: E402
-from validation.problems import bars, waves  # noqa: E402
+from validation.problems import bars, rotation, waves  # noqa: E402
+from validation.suite import FORMS, Outcome, Problem  # noqa: E402
 
 
 def bands():
@@ -84,9 +85,39 @@ def tables(scratch: Path):
     assert math.isnan(series.crossing(table["time"], table["a"], 2.5))
 
 
+def other_forms():
+    """The overview counts the bands that a form misses, also those of runs that failed; what is not repeated counts
+    nowhere."""
+    problem = Problem("p", "", "", lambda full: {}, lambda folders: [])
+    own = [near("a", "x", 1.0, 1.0, 0.1), near("a", "y", 2.0, 1.0, 0.1), near("b", "x", 1.0, 1.0, 0.1),
+           record("a", "z", 1.0)]
+    forms = {"approach": [near("a", "x", 1.2, 1.0, 0.1), near("a", "y", 1.0, 1.0, 0.1), record("a", "z", 3.0)],
+             "last": [Check("p", "run failed: a", math.nan)]}
+    outcome = Outcome(problem, own, forms, [])
+    header, row = report.overview([outcome])
+    assert row[:3] == ["p", "2", "1"], row
+    found = dict(zip(header, row))
+    assert found["approach"] == "1" and found["last"] == "2" and found["linear"] == "-", found
+    assert report.forms_table(outcome, ["approach", "last"])[1:] == [
+        ["a", "x", "+0.0%", "+20.0% (out)", "failed"], ["a", "y", "+100.0% (out)", "+0.0%", "failed"],
+        ["a", "z", "1", "3", "failed"]]
+    assert all(f"*{form}*" in report.markdown([outcome]) for form in FORMS)
+
+
+def drifts(scratch: Path):
+    """The worst of the unit test's lines for each law; none at all is a failure."""
+    (scratch / "log.txt").write_text(
+        "Note: nothing\n2-D neo_hookean  strain 0.0001: det F 9e-12, pressure 3e-07, deviator 1e-09, det 2e-08\n"
+        "2-D neo_hookean  (plane stress) strain 0.03: det F 1e-2, pressure 5e-10, deviator 2e-11, det 1e-14\n")
+    volume, stress = rotation.check_point(scratch)
+    assert volume.value == 1e-2 and not volume.passed and stress.value == 3e-7 and stress.passed
+    (scratch / "log.txt").write_text("")
+    assert not rotation.check_point(scratch)[0].passed
+
+
 def validate(*arguments) -> subprocess.CompletedProcess:
     command = [ROOT / "scripts" / "validate", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=300 * PATIENCE, check=False)
 
 
 def whole_command(cairn: Path, scratch: Path):
@@ -119,6 +150,8 @@ def main():
     papers_formulas()
     waves_and_impacts()
     tables(scratch)
+    other_forms()
+    drifts(scratch)
     whole_command(cairn, scratch)
 
 

@@ -73,4 +73,5 @@ def draw(folders: Folders, out: Path) -> list[Path]:
     return [draw_panels(out / "backspin.png", "Backspin", panels)]
 
 
-PROBLEM = Problem("backspin", "Backspin", "Bardenhagen et al. 2001, section 3.2, eqs. 25 and 26", runs, checks, draw)
+PROBLEM = Problem("backspin", "Backspin", "Bardenhagen et al. 2001, section 3.2, eqs. 25 and 26", runs, checks, draw,
+                  literal=(label(8, GAPS[0]),))

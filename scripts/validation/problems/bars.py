@@ -117,4 +117,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("bars", "Two equal bars", "one-dimensional waves; Johnson, Contact Mechanics, section 11.1", runs,
-                  checks, draw)
+                  checks, draw, literal=tuple(label(closing, CELLS[1], GAPS[0]) for closing in CLOSING))

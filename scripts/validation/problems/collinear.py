@@ -85,4 +85,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("collinear", "Stress wave in four collinear disks", "Bardenhagen et al. 2001, section 3.3, Fig. 9",
-                  runs, checks, draw)
+                  runs, checks, draw, literal=(PAPER,))
