@@ -22,18 +22,28 @@ void check_cover(const std::filesystem::path& file, MPI_Comm comm, const RowBloc
                                                             file.string(), all, rows.total_rows));
 }
 
+template <class T>
+T value_of(const std::span<const T>&);
+template <class T>
+T value_of(const BlockSource<T>&);
+
 /// Bytes of all columns over all rows.
 std::int64_t bytes_of(std::span<const Column> columns, std::int64_t rows) {
   std::int64_t bytes = 0;
   for (const auto& column : columns) {
-    const std::size_t value = std::visit([](auto values) { return sizeof(values[0]); }, column.values);
+    const std::size_t value = std::visit([](const auto& values) { return sizeof(value_of(values)); }, column.values);
     bytes += rows * column.components * static_cast<std::int64_t>(value);
   }
   return bytes;
 }
 
+bool holds_doubles(const Column& column) {
+  return std::holds_alternative<std::span<const double>>(column.values) ||
+         std::holds_alternative<BlockSource<double>>(column.values);
+}
+
 void write_column(TableWriter& writer, const std::string& path, const RowBlocks& rows, const Column& column) {
-  std::visit([&](auto values) { writer.write(path, column.components, rows, values); }, column.values);
+  std::visit([&](const auto& values) { writer.write(path, column.components, rows, values); }, column.values);
 }
 
 void write_header(TableWriter& writer, const std::string& kind, const RowBlocks& rows, double time, std::int64_t step) {
@@ -43,13 +53,17 @@ void write_header(TableWriter& writer, const std::string& kind, const RowBlocks&
   writer.add_attribute("/", "step", step);
 }
 
-/// This rank's even share of `total` rows, for data that follow from the row number.
+/// This rank's even share of `total` rows, for data that follow from the row number, in blocks.
 RowBlocks even_share(MPI_Comm comm, std::int64_t total) {
+  constexpr std::int64_t longest = 1 << 16;
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
   const auto begin = [&](std::int64_t r) { return total / ranks * r + std::min<std::int64_t>(r, total % ranks); };
-  return {{{begin(rank), begin(rank + 1) - begin(rank)}}, total};
+  RowBlocks rows{{}, total};
+  for (std::int64_t row = begin(rank); row < begin(rank + 1); row += longest)
+    rows.blocks.push_back({row, std::min(longest, begin(rank + 1) - row)});
+  return rows;
 }
 
 /// A grid of vertices: cell i has one point, point i.
@@ -57,18 +71,25 @@ void write_vertices(TableWriter& writer, MPI_Comm comm, std::int64_t points) {
   const RowBlocks one = even_share(comm, 1);
   const std::vector<std::int64_t> number(static_cast<std::size_t>(one.local_rows()), points);
   for (const char* name : {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"})
-    writer.write<std::int64_t>(fmt::format("VTKHDF/{}", name), 1, one, number);
+    writer.write(fmt::format("VTKHDF/{}", name), 1, one, std::span(number));
 
+  std::vector<std::int64_t> count;
+  const auto row_numbers = [&](const RowBlocks& rows) {
+    return BlockSource<std::int64_t>([&](std::size_t block) {
+      count.resize(static_cast<std::size_t>(rows.blocks[block].count));
+      std::iota(count.begin(), count.end(), rows.blocks[block].file_row);
+      return std::span(count);
+    });
+  };
   const RowBlocks cells = even_share(comm, points), offsets = even_share(comm, points + 1);
-  std::vector<std::int64_t> count(static_cast<std::size_t>(cells.local_rows()));
-  std::iota(count.begin(), count.end(), cells.blocks[0].file_row);
-  writer.write<std::int64_t>("VTKHDF/Connectivity", 1, cells, count);
-  count.resize(static_cast<std::size_t>(offsets.local_rows()));
-  std::iota(count.begin(), count.end(), offsets.blocks[0].file_row);
-  writer.write<std::int64_t>("VTKHDF/Offsets", 1, offsets, count);
+  writer.write("VTKHDF/Connectivity", 1, cells, row_numbers(cells));
+  writer.write("VTKHDF/Offsets", 1, offsets, row_numbers(offsets));
   constexpr std::uint8_t vtk_vertex = 1;
-  const std::vector<std::uint8_t> types(static_cast<std::size_t>(cells.local_rows()), vtk_vertex);
-  writer.write<std::uint8_t>("VTKHDF/Types", 1, cells, types);
+  std::vector<std::uint8_t> types;
+  writer.write("VTKHDF/Types", 1, cells, BlockSource<std::uint8_t>([&](std::size_t block) {
+                 types.assign(static_cast<std::size_t>(cells.blocks[block].count), vtk_vertex);
+                 return std::span(types);
+               }));
 }
 
 }  // namespace
@@ -77,7 +98,7 @@ void write_vtkhdf(const std::filesystem::path& file, MPI_Comm comm, const RowBlo
                   std::span<const Column> columns, double time, std::int64_t step, const std::string& kind) {
   const auto position =
       std::find_if(columns.begin(), columns.end(), [](const Column& c) { return c.name == "position"; });
-  const bool has_points = position != columns.end() && position->components == 3 && position->values.index() == 0;
+  const bool has_points = position != columns.end() && position->components == 3 && holds_doubles(*position);
   throw_together(comm,
                  has_points ? "" : fmt::format("cannot write {}: no column position of 3 doubles", file.string()));
   check_cover(file, comm, rows);

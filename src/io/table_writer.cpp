@@ -33,12 +33,6 @@ Handle create_dataset(hid_t file, const std::string& path, hid_t type, std::int6
   return {H5Dcreate2(file, path.c_str(), type, space, H5P_DEFAULT, properties, H5P_DEFAULT), H5Dclose};
 }
 
-/// Opens a path and has it flushed to disk; 0 or the system's error.
-int flush_to_disk(const std::filesystem::path& path, int flags) {
-  const PosixFile open(path, flags);
-  return open.valid() && open.flush() ? 0 : errno;
-}
-
 /// Claims space for a file; 0 or the system's error. Where the file system cannot claim, it is asked what is free.
 int claim_space(int descriptor, int mode, std::int64_t bytes) {
   if (::fallocate(descriptor, mode, 0, bytes) == 0) return 0;
@@ -92,12 +86,24 @@ std::string write_failure(const std::filesystem::path& file, const std::string& 
   return fmt::format("cannot write {}: {}: {}{}", file.string(), what, reason, free);
 }
 
+std::string flush_to_disk(const std::filesystem::path& file) {
+  const PosixFile open(file, O_RDWR);
+  if (!open.valid() || !open.flush()) return write_failure(file, "flushing to disk", std::strerror(errno));
+  // Some file systems cannot flush a folder; the file is whole in any case.
+  const PosixFile folder(folder_of(file), O_RDONLY | O_DIRECTORY);
+  if (folder.valid()) folder.flush();
+  return {};
+}
+
+std::string rename_to(const std::filesystem::path& temporary, const std::filesystem::path& file) {
+  if (::rename(temporary.c_str(), file.c_str()) == 0) return {};
+  return write_failure(file, "renaming", std::strerror(errno));
+}
+
 std::string publish(const std::filesystem::path& temporary, const std::filesystem::path& file) {
-  int error = flush_to_disk(temporary, O_RDWR);
-  if (error == 0 && ::rename(temporary.c_str(), file.c_str()) != 0) error = errno;
-  // Some file systems cannot flush a folder; the renamed file is whole in any case.
-  if (error == 0) flush_to_disk(folder_of(file), O_RDONLY | O_DIRECTORY);
-  return error == 0 ? "" : write_failure(file, "flushing and renaming", std::strerror(error));
+  std::string error = flush_to_disk(temporary);
+  if (error.empty()) error = rename_to(temporary, file);
+  return error.empty() ? flush_to_disk(file) : error;
 }
 
 TableWriter::TableWriter(std::filesystem::path file, MPI_Comm comm, std::int64_t bytes)
@@ -191,31 +197,39 @@ std::int64_t TableWriter::lay_out(const std::string& path, int components, std::
   return place;
 }
 
-void TableWriter::write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type,
-                             std::size_t value_bytes, const void* values, std::size_t size) {
+void TableWriter::check(const std::string& path, const RowBlocks& rows, int components, std::size_t size) {
   const std::string wrong = check_rows(rows, components, size);
   throw_together(comm_,
                  wrong.empty() ? "" : fmt::format("cannot write {}: dataset {}: {}", file_.string(), path, wrong));
+}
+
+void TableWriter::write_blocks(const std::string& path, int components, const RowBlocks& rows, hid_t type,
+                               std::size_t value_bytes, const BlockSource<std::byte>& values) {
+  check(path, rows, components, static_cast<std::size_t>(rows.local_rows() * components));
   const std::int64_t place = lay_out(path, components, rows.total_rows, type);
   const std::int64_t row_bytes = components * static_cast<std::int64_t>(value_bytes);
-  const auto* bytes = static_cast<const char*>(values);
   bool good = true;
-  for (const auto& block : merged_blocks(rows)) {
-    const std::int64_t count = block.count * row_bytes;
-    good = good && rows_.write(bytes, count, place + block.file_row * row_bytes);
-    bytes += count;
+  for (std::size_t i = 0; i < rows.blocks.size() && good; ++i) {
+    const auto& block = rows.blocks[i];
+    if (block.count == 0) continue;
+    const std::span<const std::byte> bytes = values(i);
+    errno = EINVAL;  // unless they are as many as they have to be
+    good = std::ssize(bytes) == block.count * row_bytes &&
+           rows_.write(bytes.data(), std::ssize(bytes), place + block.file_row * row_bytes);
   }
   require(good, "dataset " + path);
 }
 
 void TableWriter::finish(bool sealed) {
-  const bool flushed = rows_.flush();
+  const bool flushed = !sealed || rows_.flush();
   require(flushed && rows_.close(), "flushing");
   on_first_rank("flushing", [&] { return H5Fflush(handle_, H5F_SCOPE_GLOBAL) >= 0; });
   on_first_rank("closing the file", [&] { return handle_.close(); });
   const std::string unsealed = sealed ? seal(temporary_, comm_) : "";
   throw_together(comm_, unsealed.empty() ? "" : write_failure(file_, "sealing the file", unsealed));
-  throw_together(comm_, rank_ == 0 ? publish(temporary_, file_) : "");
+  std::string error;
+  if (rank_ == 0) error = sealed ? publish(temporary_, file_) : rename_to(temporary_, file_);
+  throw_together(comm_, error);
   finished_ = true;
 }
 

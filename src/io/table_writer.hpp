@@ -48,15 +48,28 @@ class TableWriter {
   /// Writes a dataset of rows.total_rows (x components) values, each rank its own rows.
   template <class T>
   void write(const std::string& path, int components, const RowBlocks& rows, std::span<const T> values) {
-    write_rows(path, components, rows, hdf5::native_type<T>(), sizeof(T), values.data(), values.size());
+    check(path, rows, components, values.size());
+    const RowBlocks merged{merged_blocks(rows), rows.total_rows};
+    std::size_t at = 0;
+    write<T>(path, components, merged, [&](std::size_t block) {
+      const auto size = static_cast<std::size_t>(merged.blocks[block].count * components);
+      return values.subspan(std::exchange(at, at + size), size);
+    });
+  }
+  /// Likewise, block by block.
+  template <class T>
+  void write(const std::string& path, int components, const RowBlocks& rows, const BlockSource<T>& values) {
+    write_blocks(path, components, rows, hdf5::native_type<T>(), sizeof(T),
+                 [&](std::size_t block) { return std::as_bytes(values(block)); });
   }
 
-  /// Flushes to disk and renames; `sealed` (seal.hpp): with a checksum of the whole file at its end.
+  /// Renames; `sealed`: with a checksum of the whole file at its end (seal.hpp), and flushed to disk before.
   void finish(bool sealed = false);
 
  private:
-  void write_rows(const std::string& path, int components, const RowBlocks& rows, hid_t type, std::size_t value_bytes,
-                  const void* values, std::size_t size);
+  void check(const std::string& path, const RowBlocks& rows, int components, std::size_t size);
+  void write_blocks(const std::string& path, int components, const RowBlocks& rows, hid_t type, std::size_t value_bytes,
+                    const BlockSource<std::byte>& values);
   /// Makes a dataset and says where in the file its values lie.
   std::int64_t lay_out(const std::string& path, int components, std::int64_t total_rows, hid_t type);
   /// Has rank 0 do what returns whether it went well; throws on every rank where it did not.

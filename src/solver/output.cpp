@@ -13,9 +13,6 @@ class Columns {
  public:
   std::vector<double>& add_doubles(const std::string& name, int components) { return add(name, components, doubles_); }
   std::vector<std::int32_t>& add_ints(const std::string& name, int components) { return add(name, components, ints_); }
-  std::vector<std::int64_t>& add_longs(const std::string& name, int components) {
-    return add(name, components, longs_);
-  }
 
   std::vector<Column> view() const {
     std::vector<Column> columns;
@@ -35,11 +32,9 @@ class Columns {
     columns_.emplace_back(name, components, &store.back());
     return store.back();
   }
-  using Values =
-      std::variant<const std::vector<double>*, const std::vector<std::int32_t>*, const std::vector<std::int64_t>*>;
+  using Values = std::variant<const std::vector<double>*, const std::vector<std::int32_t>*>;
   std::deque<std::vector<double>> doubles_;
   std::deque<std::vector<std::int32_t>> ints_;
-  std::deque<std::vector<std::int64_t>> longs_;
   std::vector<std::tuple<std::string, int, Values>> columns_;
 };
 
@@ -73,120 +68,98 @@ RowBlocks consecutive_rows(std::int64_t count, MPI_Comm comm) {
   return rows;
 }
 
+/// Columns of the points, made patch by patch as they are written.
 template <int Dim>
 class PointTable {
  public:
   using C = PointColumns<Dim>;
-  explicit PointTable(const Simulation<Dim>& simulation) : simulation_(simulation) {}
+  explicit PointTable(const Simulation<Dim>& simulation) : simulation_(simulation) {
+    for (const auto& patch : simulation.patches())
+      if (patch.point_count() > 0) filled_.push_back(&patch);
+  }
 
   void add(const std::string& field) {
+    using P = Points<Dim>;
     if (field == "position")
-      add_columns(field, 3, [](auto& points, int p, int c) { return c < Dim ? points.column(c)[p] : 0.0; });
+      add_points(field, 3, [](const P& points, int p, int c) { return c < Dim ? points.column(c)[p] : 0.0; });
     else if (field == "velocity")
-      add_columns(field, 3,
-                  [](auto& points, int p, int c) { return c < Dim ? points.column(C::velocity + c)[p] : 0.0; });
+      add_points(field, 3,
+                 [](const P& points, int p, int c) { return c < Dim ? points.column(C::velocity + c)[p] : 0.0; });
     else if (field == "spin")
-      add_columns(field, 3, [](auto& points, int p, int c) {
+      add_points(field, 3, [](const P& points, int p, int c) {
         return Dim == 3 ? points.column(C::spin + c % spin_size<Dim>)[p] : c == 2 ? points.column(C::spin)[p] : 0.0;
       });
     else if (field == "stress")
-      add_columns(field, 6, [](auto& points, int p, int c) {
+      add_points(field, 6, [](const P& points, int p, int c) {
         return c < symmetric_size<Dim> ? points.column(C::stress + c)[p] : 0.0;
       });
     else if (field == "deformation_gradient")
-      add_columns(field, 9, [](auto& points, int p, int c) {
+      add_points(field, 9, [](const P& points, int p, int c) {
         if (Dim == 2 && c != 8 && (c % 3 == 2 || c / 3 == 2)) return 0.0;
         return points.column(C::deformation + tensor_index<Dim>(c / 3, c % 3))[p];
       });
     else if (field == "volume")
-      add_piecewise(field, [](auto& piece, double) { return volumes(piece.points); });
-    else if (field == "mass")
-      add_piecewise(field, [](auto& piece, double density) {
-        std::vector<double> m(piece.points.column(C::volume), piece.points.column(C::volume) + piece.points.size());
-        for (double& value : m) value *= density;
-        return m;
-      });
-    else if (field == "body")
-      add_body();
+      add_points(field, 1, [](const P& points, int p, int) { return volume(points, p); });
     else if (field == "id")
-      add_id();
+      add_points<std::int64_t>(field, 1, [](const P& points, int p, int) { return points.ids()[p]; });
     else if (field == "image")
-      add_image();
+      add_points<std::int32_t>(field, 3, [](const P& points, int p, int c) { return points.images()[p][c]; });
+    else if (field == "body")
+      add_pieces<std::int32_t>(field, 1, [](const Piece<Dim>& piece, int, int) { return piece.body; });
+    else if (field == "mass")
+      add_pieces<double>(field, 1, [this](const Piece<Dim>& piece, int p, int) {
+        return piece.points.column(C::volume)[p] * simulation_.material_of(piece).density;
+      });
     else
       add_state(field);
   }
 
-  std::vector<Column> view() const { return columns_.view(); }
+  std::span<const Column> view() const { return columns_; }
 
  private:
-  template <class F>
-  void for_pieces(F&& f) const {
-    for (const auto& patch : simulation_.patches())
-      for (const auto& piece : patch.pieces) f(piece);
+  /// A column with value(piece, point, component).
+  template <class T, class F>
+  void add_pieces(const std::string& name, int components, const F& value) {
+    columns_.push_back({name, components, BlockSource<T>([this, components, value](std::size_t block) {
+                          auto& out = std::get<std::vector<T>>(buffers_);
+                          const Patch<Dim>& patch = *filled_[block];
+                          out.resize(static_cast<std::size_t>(patch.point_count() * components));
+                          T* next = out.data();
+                          for (const auto& piece : patch.pieces)
+                            for (int p = 0; p < piece.points.size(); ++p)
+                              for (int c = 0; c < components; ++c) *next++ = value(piece, p, c);
+                          return std::span<const T>(out);
+                        })});
   }
-  template <class F>
-  void add_columns(const std::string& name, int components, F&& value) {
-    auto& out = columns_.add_doubles(name, components);
-    out.reserve(count() * components);
-    for_pieces([&](const Piece<Dim>& piece) {
-      for (int p = 0; p < piece.points.size(); ++p)
-        for (int c = 0; c < components; ++c) out.push_back(value(piece.points, p, c));
-    });
+  /// A column with value(points, point, component).
+  template <class T = double, class F>
+  void add_points(const std::string& name, int components, const F& value) {
+    add_pieces<T>(name, components,
+                  [value](const Piece<Dim>& piece, int p, int c) { return value(piece.points, p, c); });
   }
-  template <class F>
-  void add_piecewise(const std::string& name, F&& values) {
-    auto& out = columns_.add_doubles(name, 1);
-    out.reserve(count());
-    for_pieces([&](const Piece<Dim>& piece) {
-      const std::vector<double> v = values(piece, simulation_.material_of(piece).density);
-      out.insert(out.end(), v.begin(), v.end());
-    });
-  }
-  std::size_t count() const {
-    std::size_t n = 0;
-    for (const auto& patch : simulation_.patches()) n += static_cast<std::size_t>(patch.point_count());
-    return n;
-  }
-  static std::vector<double> volumes(const Points<Dim>& points) {
-    std::vector<double> v(points.size());
-    for (int p = 0; p < points.size(); ++p) {
-      Tensor<Dim, double> F;
-      for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
-      v[p] = points.column(C::volume)[p] * determinant(F);
-    }
-    return v;
-  }
-  void add_body() {
-    auto& out = columns_.add_ints("body", 1);
-    out.reserve(count());
-    for_pieces([&](const Piece<Dim>& piece) { out.insert(out.end(), piece.points.size(), piece.body); });
-  }
-  void add_id() {
-    auto& out = columns_.add_longs("id", 1);
-    out.reserve(count());
-    for_pieces(
-        [&](const Piece<Dim>& piece) { out.insert(out.end(), piece.points.ids().begin(), piece.points.ids().end()); });
-  }
-  void add_image() {
-    auto& out = columns_.add_ints("image", 3);
-    out.reserve(3 * count());
-    for_pieces([&](const Piece<Dim>& piece) {
-      for (const Image& image : piece.points.images()) out.insert(out.end(), image.begin(), image.begin() + 3);
-    });
+  static double volume(const Points<Dim>& points, int p) {
+    Tensor<Dim, double> F;
+    for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
+    return points.column(C::volume)[p] * determinant(F);
   }
   /// A variable of the laws; zero for points whose law has none of that name.
   void add_state(const std::string& name) {
-    auto& out = columns_.add_doubles(name, 1);
-    for_pieces([&](const Piece<Dim>& piece) {
-      const auto& names = simulation_.material_of(piece).state_names;
+    std::vector<int> column;  // for each material, or -1
+    for (const SolverMaterial& material : simulation_.materials()) {
+      const auto& names = material.state_names;
       const auto at = std::find(names.begin(), names.end(), name);
-      const int c = C::state + static_cast<int>(at - names.begin());
-      for (int p = 0; p < piece.points.size(); ++p) out.push_back(at == names.end() ? 0.0 : piece.points.column(c)[p]);
+      column.push_back(at == names.end() ? -1 : C::state + static_cast<int>(at - names.begin()));
+    }
+    add_pieces<double>(name, 1, [this, column](const Piece<Dim>& piece, int p, int) {
+      const int c = column[simulation_.bodies()[piece.body].material];
+      return c < 0 ? 0.0 : piece.points.column(c)[p];
     });
   }
 
   const Simulation<Dim>& simulation_;
-  Columns columns_;
+  std::vector<const Patch<Dim>*> filled_;  // those with points: blocks of rows
+  std::vector<Column> columns_;
+  std::tuple<std::vector<double>, std::vector<std::int32_t>, std::vector<std::int64_t>> buffers_;
 };
 
 void append(std::vector<double>& out, const Vec3& v) { out.insert(out.end(), v.data(), v.data() + 3); }

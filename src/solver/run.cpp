@@ -70,6 +70,7 @@ class Run {
     }
     const double step_wall = wall_clock() - stepping - output_wall;
     write_outputs(true, wall_before_ + wall_clock() - start_);
+    flush_results();
     throw_together(comm_, tables_.error());
     display.finish();
     report(step_wall);
@@ -155,15 +156,32 @@ class Run {
     if (wanted(history_clock_)) write_history();
     if (wanted(particles_)) {
       const std::string file = name("particles", particles_);
-      write_particles(simulation_, settings_.out / file, case_.output.particles.fields);
+      write_particles(simulation_, next_result(file), case_.output.particles.fields);
       particle_index_.add(file, time, comm_);
     }
     const bool grains = wanted(grains_), contacts = wanted(contacts_);
-    if (grains) write_grains(simulation_, settings_.out / name("grains", grains_));
-    if (contacts) write_contacts(simulation_, settings_.out / name("contacts", contacts_), time - contacts_cleared_);
+    if (grains) write_grains(simulation_, next_result(name("grains", grains_)));
+    if (contacts) write_contacts(simulation_, next_result(name("contacts", contacts_)), time - contacts_cleared_);
     if (contacts || (grains && !contacts_.active())) simulation_.clear_contacts(), contacts_cleared_ = time;
     if (step == 0) checkpoints_.skip(step, time, wall);  // nothing is lost by starting again
     if (wanted(checkpoints_)) write_checkpoint_file(true);
+  }
+
+  /// The path of a result file that is to be written.
+  fs::path next_result(const std::string& name) {
+    unflushed_.push_back(settings_.out / name);
+    return unflushed_.back();
+  }
+
+  /// Has the disk hold the files of points, grains and contacts. Until then they may still be in the system's memory:
+  /// waiting for the disk after each would cost several times the writing.
+  void flush_results() {
+    std::string error;
+    if (rank_ == 0)
+      for (const auto& file : unflushed_)
+        if (error.empty()) error = flush_to_disk(file);
+    unflushed_.clear();
+    throw_together(comm_, error);
   }
 
   void write_history() {
@@ -182,6 +200,7 @@ class Run {
   /// Writes a checkpoint under the next number. One that is `scheduled` has been counted; another one, at a stop,
   /// leaves the count alone, so that the files that follow have the numbers of a run that was not stopped.
   void write_checkpoint_file(bool scheduled) {
+    flush_results();  // what comes before a checkpoint is not written again
     throw_together(comm_, tables_.error());
     RunState state;
     state.step = simulation_.step_state();
@@ -289,6 +308,7 @@ class Run {
   bool needs_wall_ = false;      // an output depends on wall time
   double contacts_cleared_ = 0;  // [s]
   fs::path last_checkpoint_;
+  std::vector<fs::path> unflushed_;
   std::int64_t steps_before_ = 0;  // of the run, before this process
   double fraction_before_ = 0, wall_before_ = 0;
 };

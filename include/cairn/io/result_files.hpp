@@ -34,6 +34,9 @@ std::string numbered_name(const std::string& kind, std::int64_t number);
 /// Removes what a program that was killed left under temporary names. Not collective.
 void remove_leftovers(const std::filesystem::path& folder);
 
+/// Has the system put a file and its name on the disk; returns the error, empty if none. Not collective.
+std::string flush_to_disk(const std::filesystem::path& file);
+
 /// Gives a file this text, all of it or none: it is written under a temporary name, flushed to disk and renamed.
 /// Returns the error, empty if none. Not collective.
 std::string replace_file(const std::filesystem::path& file, const std::string& text);

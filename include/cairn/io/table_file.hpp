@@ -5,14 +5,15 @@
 /// Every table file has, at its root, one entry for each column and the attributes `kind`, `rows`, `time` [s] and
 /// `step`, so that all are read alike. In a VTKHDF file the entries of the root are links into the group VTKHDF.
 ///
-/// Writing: the file grows under the name `.NAME.part` in the same folder, is flushed to disk and then renamed, so that
-/// a file with the final name is always whole; where writing fails, nothing is left behind. Beside the columns
-/// themselves a rank needs memory for its share of the grid's indices: 8 bytes for each of its points.
+/// Writing: the file grows under the name `.NAME.part` in the same folder and is then renamed, so that a file with the
+/// final name is always whole; where writing fails, nothing is left behind. It may still be in the system's memory:
+/// flush_to_disk (result_files.hpp).
 
 #include <mpi.h>
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -35,11 +36,18 @@ struct RowBlocks {
   }
 };
 
+/// Values made when they are written: those of the rows of one of RowBlocks::blocks, by its place there. They have to
+/// stay until the next call only, so that a large column never lies in memory as a whole.
+template <class T>
+using BlockSource = std::function<std::span<const T>(std::size_t block)>;
+
 /// One named column: local_rows x components values, row by row.
 struct Column {
   std::string name;
   int components = 1;
-  std::variant<std::span<const double>, std::span<const std::int32_t>, std::span<const std::int64_t>> values;
+  std::variant<std::span<const double>, std::span<const std::int32_t>, std::span<const std::int64_t>,
+               BlockSource<double>, BlockSource<std::int32_t>, BlockSource<std::int64_t>>
+      values;
 };
 
 /// Writes point data as a VTKHDF 1.0 unstructured grid of vertices that ParaView opens as it is. The file is written
