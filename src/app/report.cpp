@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <new>
 #include <thread>
 
@@ -52,10 +53,13 @@ std::vector<char>& reserve() {
   return bytes;
 }
 
+bool out_of_memory = false;
+
 /// Ends the job where memory runs out on one of several ranks: the others would wait for it for ever, and it could not
 /// even take its objects apart, whose messages they do not answer.
 void end_job_without_memory() {
   std::vector<char>().swap(reserve());
+  out_of_memory = true;
   std::fputs("cairn failed: a rank is out of memory; use fewer points, or more ranks on more machines\n", stderr);
   MPI_Abort(MPI_COMM_WORLD, failed);
 }
@@ -67,6 +71,10 @@ void prepare_for_failures() {
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   if (ranks == 1) return;
   reserve().reserve(std::size_t{8} << 20);
+  // MPI_Abort may find too little memory to say what it does, and then ends the program with a code of its own.
+  std::atexit([] {
+    if (out_of_memory) std::_Exit(failed);
+  });
   std::set_new_handler(end_job_without_memory);
 }
 

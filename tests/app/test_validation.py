@@ -50,6 +50,19 @@ def papers_formulas():
     assert math.isclose(float(spin.spin_at(1.0)), 10 / 7) and math.isclose(float(spin.velocity(1.0)), 10 / 7)
 
 
+def dropped_sphere():
+    """Without friction it slides freely; one that falls first gets further; a hard one rolls from the start."""
+    soft = closed_forms.DroppedSphere(1.0, 1000.0, 1e7, 0.3, 1.0)
+    times, way = soft.path(10.0, math.pi / 6, 0.0, 0.1, 1.0)
+    assert math.isclose(way[-1], 2.5, rel_tol=1e-3) and math.isclose(times[-1], 1.0)
+    placed = soft.path(10.0, math.pi / 6, 0.5, 0.0, 2.0)[1][-1]
+    dropped = soft.path(10.0, math.pi / 6, 0.5, 0.1, 2.0)[1][-1]
+    rolled = 5 / 14 * 10 * 0.5 * 2**2
+    assert rolled < placed < dropped < 10 * 0.5 * 2**2 / 2  # it slips while it flies
+    hard = closed_forms.DroppedSphere(1.0, 1000.0, 1e10, 0.3, 1.0)
+    assert math.isclose(hard.path(10.0, math.pi / 6, 0.5, 0.0, 2.0, 1e-5)[1][-1], rolled, rel_tol=5e-3)
+
+
 def waves_and_impacts():
     """Integrated solutions meet their closed forms, and the measures find what was put in."""
     hertz = closed_forms.HertzSphere(1.0, 1.1)
@@ -148,6 +161,7 @@ def main():
     cairn, scratch = Path(sys.argv[1]), fresh_folder(sys.argv[2])
     bands()
     papers_formulas()
+    dropped_sphere()
     waves_and_impacts()
     tables(scratch)
     other_forms()

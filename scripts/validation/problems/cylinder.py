@@ -1,4 +1,8 @@
-"""A plate pressed on a cylinder, in plane strain: width of the contact and pressure there, against Hertz."""
+"""A plate pressed on a cylinder, in plane strain: width of the contact and pressure there, against Hertz.
+
+Both over the load, so that it does not matter from where the approach is counted; in plane strain it depends on the
+whole body and not on the contact alone.
+"""
 
 from __future__ import annotations
 

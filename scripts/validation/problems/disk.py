@@ -11,7 +11,7 @@ from validation.figures import convergence, draw_panels
 from validation.problems import rolling
 from validation.runs import NO_PARTICLES, Run
 from validation.series import motion
-from validation.suite import Folders, Problem
+from validation.suite import SETTINGS, Folders, Problem
 
 RADIUS, GRAVITY, END = 0.5, 9.8, 2.0  # [m], [m/s2], [s]
 CELLS = (2, 4, 8)  # to a radius
@@ -90,4 +90,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 PROBLEM = Problem(
     "disk", "Disk on a rigid incline", "Bardenhagen, Brackbill & Sulsky 2000, section 4.1, eq. 25", runs, checks, draw,
     literal=tuple(label(friction, degrees, cells, "h/2") for friction, degrees, _ in CASES for cells in (4, 8)),
-    forms=("approach", "A as printed"))  # at a wall the others come to one of these, or to the default
+    forms=("approach", "A as printed", *SETTINGS))  # at a wall the papers' others come to these, or to the default

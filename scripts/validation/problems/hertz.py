@@ -1,4 +1,10 @@
-"""An elastic sphere, pressed slowly by a plate and hitting a wall, against Hertz."""
+"""An elastic sphere, pressed slowly by a plate and hitting a wall, against Hertz.
+
+Bodies hold each other from a fraction of a cell away, so that the approach at which the force begins is itself a matter
+of the cells. The force is shown three times: over the approach of the undeformed bodies; over that since the first
+force, as an experiment counts it; and with the zero fitted, by which Hertz's curve is met best with its own E*. The
+contact's radius over the force and the duration of an impact need no zero.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +19,7 @@ from validation.figures import Curve, Panel, draw_panels
 from validation.problems import pressing
 from validation.problems.pressing import RADIUS, SPEED
 from validation.runs import Run
-from validation.series import motion
+from validation.series import crossing, motion
 from validation.suite import Folders, Problem
 
 CELLS = (8, 16, 32)  # to a radius
@@ -44,16 +50,28 @@ def runs(full: bool) -> dict[str, Run]:
         f"impact, R/{count}": impact(count) for count in cells}
 
 
+def zeros(folder: Path, cells: int) -> tuple[float, float]:
+    """The approach at the first force, and the zero of the approach with which Hertz's curve fits best [m]."""
+    times, forces = pressing.force_series(folder)
+    depths, forces = SPEED * times - RADIUS / cells / 2, 4 * forces  # the model is a quarter of the contact
+    pressed_hard = forces > 0.05 * forces[-1]
+    fitted = [depth - HERTZ.approach(force) for depth, force in zip(depths[pressed_hard], forces[pressed_hard])]
+    return crossing(depths, forces, 1e-3 * forces[-1]), float(np.mean(fitted))
+
+
 def pressed(folder: Path, cells: int) -> list[tuple[float, list[tuple[str, float, float | None]]]]:
     """At each output: the contact's radius after Hertz, and what was measured, with Hertz's value."""
     found = []
+    first, fitted = zeros(folder, cells)
     for state in pressing.states(folder, RADIUS / cells):
         if state.depth <= 0:  # held from up to half a cell away
             continue
-        force = 4 * state.force  # the model is a quarter of the contact
+        force = 4 * state.force
         radius = HERTZ.contact_radius(force)
         found.append((radius, [
             ("force at the approach [N]", force, float(HERTZ.force(state.depth))),
+            ("force at the approach since the first force [N]", force, float(HERTZ.force(state.depth - first))),
+            ("force at the approach from the fitted zero [N]", force, float(HERTZ.force(state.depth - fitted))),
             (STAND_OFF, (HERTZ.approach(force) - state.depth) * cells / RADIUS, None),
             ("contact radius a at the force [m]", math.sqrt(2.5 * state.second_moment), radius),
             ("peak pressure at the force [Pa]", state.peak, HERTZ.peak_pressure(force))]))
@@ -73,10 +91,14 @@ def impact_checks(folders: Folders) -> list[Check]:
         lasts = (end - start) / (exact[1] - exact[0]) * HERTZ.impact_time(MASS, IMPACT_SPEED)
         errors.append(abs(lasts / HERTZ.impact_time(MASS, IMPACT_SPEED) - 1))
         deepest = RADIUS - path["y"].min()
+        first = crossing(path["time"], path["vy"] + IMPACT_SPEED, 2e-3 * IMPACT_SPEED)
+        since_first = float(np.interp(first, path["time"], path["y"])) - path["y"].min()
         across = 2 * math.sqrt(RADIUS * HERTZ.largest_approach(MASS, IMPACT_SPEED)) * cells / RADIUS
         case = f"{case}, {across:.1f} cells across"
         found += [record(case, "duration [s]", lasts, HERTZ.impact_time(MASS, IMPACT_SPEED)),
                   record(case, "largest approach [m]", deepest, HERTZ.largest_approach(MASS, IMPACT_SPEED)),
+                  record(case, "largest approach since the first force [m]", since_first,
+                         HERTZ.largest_approach(MASS, IMPACT_SPEED)),
                   record(case, "parting/closing speed", path["vy"][-1] / IMPACT_SPEED, 1.0)]
     if len(errors) > 1:
         found.append(holds("impact", "error of the duration falls with h", errors[-1] < errors[0]))
