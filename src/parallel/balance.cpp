@@ -26,7 +26,7 @@ void put_patch(const Patch<Dim>& patch, Message& message) {
   message.put(std::int64_t{patch.id});
   message.put(patch.ledger.contact_dissipation);
   message.put(patch.ledger.boundary_work);
-  message.put(patch.ledger.numerical_dissipation);
+  message.put(patch.ledger.blended_and_spun);
   message.put(patch.ledger.contact_nodes);
   message.put(static_cast<std::int64_t>(patch.contacts.size()));
   for (const auto& [pair, sum] : patch.contacts) {
@@ -44,7 +44,7 @@ Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim
   Patch<Dim> patch(static_cast<int>(message.integer(at++)), lattice);
   patch.ledger.contact_dissipation = *message.data(at++);
   patch.ledger.boundary_work = *message.data(at++);
-  patch.ledger.numerical_dissipation = *message.data(at++);
+  patch.ledger.blended_and_spun = *message.data(at++);
   patch.ledger.contact_nodes = message.integer(at++);
   for (std::int64_t n = message.integer(at++); n > 0; --n) {
     const int a = static_cast<int>(message.integer(at++)), b = static_cast<int>(message.integer(at++));

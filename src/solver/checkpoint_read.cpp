@@ -71,7 +71,7 @@ void read_ledgers(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches) {
     in.template read_patches<std::int64_t>(name);
   const auto dissipation = in.template read_patches<double>("contact_dissipation");
   const auto work = in.template read_patches<double>("boundary_work");
-  const auto numerical = in.template read_patches<double>("numerical_dissipation");
+  const auto numerical = in.template read_patches<double>("blended_and_spun");
   const auto nodes = in.template read_patches<std::int64_t>("contact_nodes");
   for (std::size_t p = 0; p < patches.size(); ++p)
     patches[p].ledger = {dissipation[p], work[p], numerical[p], nodes[p]};

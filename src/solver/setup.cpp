@@ -285,13 +285,20 @@ void Simulation<Dim>::place_points(const Case& c) {
     if (owner_[id] == rank_) filler.fill(*patch++, first_id);
   connect_patches();
 
-  for (const auto& patch : patches_)
-    for (const auto& piece : patch.pieces)
+  using C = PointColumns<Dim>;
+  for (auto& patch : patches_)
+    for (const auto& piece : patch.pieces) {
+      const auto inertia = spin_inertia(piece, lattice_, transfer_);
       for (int p = 0; p < piece.points.size(); ++p) {
-        double squared = 0;
-        for (int d = 0; d < Dim; ++d) squared += std::pow(piece.points.column(PointColumns<Dim>::velocity + d)[p], 2);
+        double squared = 0, spin = 0;
+        for (int d = 0; d < Dim; ++d) squared += std::pow(piece.points.column(C::velocity + d)[p], 2);
+        for (int s = 0; s < spin_size<Dim>; ++s)
+          spin += inertia[p][s] * std::pow(piece.points.column(C::spin + s)[p], 2);
         speeds_.point = std::max(speeds_.point, std::sqrt(squared));
+        if (!is_rigid(piece))
+          patch.ledger.blended_and_spun += 0.5 * material_of(piece).density * piece.points.column(C::volume)[p] * spin;
       }
+    }
   start_speed_reduction();
 }
 

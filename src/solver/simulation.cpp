@@ -167,7 +167,7 @@ void Simulation<Dim>::accelerate_points(Patch<Dim>& patch) {
     if (is_rigid(piece))
       project_momentum(piece, lattice_, transfer_, density);
     else
-      patch.ledger.numerical_dissipation += accelerate_and_project(piece, lattice_, transfer_, density, dt_);
+      patch.ledger.blended_and_spun += accelerate_and_project(piece, lattice_, transfer_, density, dt_);
   });
 }
 
@@ -197,11 +197,10 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
     if (is_rigid(piece)) {
       move_rigid(piece);
     } else if (strained) {
-      patch.ledger.numerical_dissipation +=
-          accelerate_and_move(piece, lattice_, transfer_, material.density, dt_, speeds_);
+      patch.ledger.blended_and_spun += accelerate_and_move(piece, lattice_, transfer_, material.density, dt_, speeds_);
     } else {
       if (solver_.stress_update == StressUpdate::last) {
-        patch.ledger.numerical_dissipation += accelerate(piece, lattice_, transfer_, material.density, dt_);
+        patch.ledger.blended_and_spun += accelerate(piece, lattice_, transfer_, material.density, dt_);
         velocity_from_motion(piece);
       }
       update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);

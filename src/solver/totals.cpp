@@ -38,9 +38,10 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, const
             height += gravity[d] * (points.column(d)[p] + points.images()[p][d] * simulation.lattice().length(d));
             sums[6 + d] += mass * v;
           }
-          for (int s = 0; s < spin_size<Dim>; ++s)
-            squared += inertia[p][s] * std::pow(points.column(C::spin + s)[p], 2);
-          sums[0] += 0.5 * mass * squared;
+          double spin = 0;
+          for (int s = 0; s < spin_size<Dim>; ++s) spin += inertia[p][s] * std::pow(points.column(C::spin + s)[p], 2);
+          sums[0] += 0.5 * mass * (squared + spin);
+          sums[12] -= 0.5 * mass * spin;
           sums[1] += volume * law.strain_energy(deformation_of(points, p), state.data());
           sums[2] -= mass * height;
           sums[3] += volume * law.plastic_work(state.data());
@@ -61,7 +62,7 @@ Totals Simulation<Dim>::totals() const {
     Sums sums{};
     for (const auto& piece : patch.pieces) add_piece(*this, piece, transfer_.gravity, sums);
     sums[4] = patch.ledger.contact_dissipation, sums[5] = patch.ledger.boundary_work;
-    sums[10] = static_cast<double>(patch.ledger.contact_nodes), sums[12] = patch.ledger.numerical_dissipation;
+    sums[10] = static_cast<double>(patch.ledger.contact_nodes), sums[12] += patch.ledger.blended_and_spun;
     mine.push_back(patch.id);
     mine.insert(mine.end(), sums.begin(), sums.end());
   }

@@ -39,36 +39,36 @@ PointMotion<Dim> gather_motion(const Stencil<Dim, Shape>& stencil, int lane, con
 
 /// w_p += dt sum N arm x a / sum N arm^2, the transpose of how spin gives momentum to the nodes: energy and angular
 /// momentum go to the points as the nodes have them. `moment[d]` is sum N arm_d (acceleration, velocity); of the rest,
-/// 1 - `keep`, it takes the grid's spin. Returns the energy that this takes, per half the point's mass.
+/// 1 - `keep`, it takes the grid's spin. Returns the energy that the nodes give, per half the point's mass.
 template <int Dim, class Shape>
 double turn_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
                   const MotionRow<Dim> (&moment)[Dim], double dt, double keep) {
   using M = NodeMotion<Dim>;
-  double taken = 0;
+  double given = 0;
   for_spins<Dim>([&](int s, int i, int j) {
     const double inertia = stencil.spread[i][lane] + stencil.spread[j][lane];
     if (!(inertia > 0)) return;  // on a node of linear shapes: it gives no momentum either
     const auto curl = [&](int first) { return (moment[i][first + j] - moment[j][first + i]) / inertia; };
     double& w = points.column(PointColumns<Dim>::spin + s)[p];
     const double turned = w + dt * curl(M::acceleration);
+    given += inertia * (turned * turned - w * w);
     w = keep * turned + (1.0 - keep) * curl(M::velocity);
-    taken += inertia * (turned * turned - w * w);
   });
-  return taken;
+  return given;
 }
 
-/// v_p += dt sum N a, blended with sum N v; and spin. Returns the energy that blending and relaxation take, per half
-/// the point's mass.
+/// v_p += dt sum N a, blended with sum N v; and spin. Returns the energy that blending takes from the velocity and the
+/// nodes give to the spin, per half the point's mass.
 template <int Dim, class Shape>
 double accelerate_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& stencil, int lane,
                         const PointMotion<Dim>& m, double dt, const TransferSettings<Dim>& settings) {
   using M = NodeMotion<Dim>;
-  double taken = 0;
+  double energy = 0;
   if constexpr (Stencil<Dim, Shape>::spinning) {
     double squared = 0;  // of the cells that the point moves in this step
     for (int d = 0; d < Dim; ++d) squared += std::pow(dt * m.sum[M::velocity + d] * stencil.inverse_spacing[d], 2);
     const double relaxed = std::min(1.0, settings.spin_relaxation * std::sqrt(squared));
-    taken = turn_point(points, p, stencil, lane, m.moment, dt, settings.flip * (1.0 - relaxed));
+    energy = turn_point(points, p, stencil, lane, m.moment, dt, settings.flip * (1.0 - relaxed));
   }
   for (int d = 0; d < Dim; ++d) {
     double& v = points.column(PointColumns<Dim>::velocity + d)[p];
@@ -76,23 +76,23 @@ double accelerate_point(Points<Dim>& points, int p, const Stencil<Dim, Shape>& s
     if (settings.flip == 1.0) continue;
     const double updated = v;
     v = settings.flip * updated + (1.0 - settings.flip) * m.sum[M::velocity + d];
-    taken += updated * updated - v * v;
+    energy += updated * updated - v * v;
   }
-  return taken;
+  return energy;
 }
 
-/// accelerate_point for eight points, calling after(lane, motion) for each. Returns the energy taken [J].
+/// accelerate_point for eight points, calling after(lane, motion) for each. Returns the energy [J].
 template <int Dim, class Shape, class F>
 double accelerate_points(Piece<Dim>& piece, int first, int count, const Stencil<Dim, Shape>& stencil, double density,
                          double dt, const TransferSettings<Dim>& settings, F&& after) {
-  double taken = 0;
+  double energy = 0;
   for (int lane = 0; lane < count; ++lane) {
     const PointMotion<Dim> m = gather_motion(stencil, lane, piece.nodes.motion.data());
     const double half_mass = 0.5 * density * piece.points.column(PointColumns<Dim>::volume)[first + lane];
-    taken += half_mass * accelerate_point(piece.points, first + lane, stencil, lane, m, dt, settings);
+    energy += half_mass * accelerate_point(piece.points, first + lane, stencil, lane, m, dt, settings);
     after(lane, m);
   }
-  return taken;
+  return energy;
 }
 
 template <int Dim, class Shape>
@@ -173,25 +173,25 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
 template <int Dim>
 double accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density,
                   double dt) {
-  double taken = 0;
+  double energy = 0;
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    taken +=
+    energy +=
         accelerate_points(piece, first, count, stencil, density, dt, settings, [](int, const PointMotion<Dim>&) {});
   });
-  return taken;
+  return energy;
 }
 
 template <int Dim>
 double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                            double density, double dt, SpeedLimits& speeds) {
-  double taken = 0, fastest = speeds.point * speeds.point;
+  double energy = 0, fastest = speeds.point * speeds.point;
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    taken += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto& m) {
+    energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto& m) {
       fastest = move(piece.points, first + lane, m, dt, fastest);
     });
   });
   speeds.point = std::sqrt(fastest);
-  return taken;
+  return energy;
 }
 
 template <int Dim>
@@ -207,14 +207,14 @@ void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Tran
 template <int Dim>
 double accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                               double density, double dt) {
-  double taken = 0;
+  double energy = 0;
   piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    taken += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto&) {
+    energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto&) {
       scatter_momentum(piece.points, first + lane, stencil, lane, density, piece.nodes.velocity.data());
     });
   });
-  return taken;
+  return energy;
 }
 
 template <int Dim>

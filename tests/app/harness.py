@@ -11,15 +11,17 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SKIP = 77  # exit code of a test that cannot run here
+# What time limits are multiplied by: more with sanitizers, and where other work keeps the machine busy.
+PATIENCE = float(os.environ.get("CAIRN_TEST_PATIENCE", "1"))
 
-# Lines of mpirun about an exit code that is not 0.
-NOISE = ("-----", "Primary job", "a non-zero", "mpirun detected", "the job to be", "Process name", "Exit code",
-         "Per user-direction")
+# Lines of Open MPI about an exit code that is not 0, and about a run that was stopped for a while from outside.
+NOISE = ("(null): Forwarding signal", "-----", "Primary job", "a non-zero", "mpirun detected", "the job to be",
+         "Process name", "Exit code", "Per user-direction")
 
 
 @dataclasses.dataclass
 class Done:
-    """What a command did; code 'hang' if it did not end."""
+    """What a command did; code 'hang' if it did not end in time."""
 
     code: object
     out: str
@@ -53,14 +55,29 @@ class Program:
 
     def __call__(self, *arguments, ranks: int = 1, cwd: Path | None = None, timeout: float = 120, **options) -> Done:
         """Runs `cairn ARGUMENTS`; `options` go to subprocess.run."""
+        process = subprocess.Popen(self.command(*arguments, ranks=ranks), cwd=cwd, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, **options)
         try:
-            done = subprocess.run(self.command(*arguments, ranks=ranks), cwd=cwd, capture_output=True, timeout=timeout,
-                                  check=False, **options)
+            out, err = process.communicate(timeout=timeout * PATIENCE)
         except subprocess.TimeoutExpired:
-            return Done("hang", "", "")
-        lines = done.stderr.decode(errors="replace").splitlines()
-        err = "\n".join(line for line in lines if line.strip() and not line.strip().startswith(NOISE))
-        return Done(done.returncode, done.stdout.decode(errors="replace"), err)
+            return Done("hang", "", end(process))
+        lines = err.decode(errors="replace").splitlines()
+        text = "\n".join(line for line in lines if line.strip() and not line.strip().startswith(NOISE))
+        return Done(process.returncode, out.decode(errors="replace"), text)
+
+
+def end(process: subprocess.Popen) -> str:
+    """Ends a program that hangs, and its ranks with it; says what they were waiting for: the state (T is stopped from
+    outside), the processor time, and the system call."""
+    show = ["ps", "-o", "pid,stat,time,wchan:20,comm", "--pid", str(process.pid), "--ppid", str(process.pid)]
+    states = subprocess.run(show, capture_output=True, text=True, check=False).stdout
+    process.terminate()  # mpirun ends its ranks then
+    try:
+        process.communicate(timeout=10 * PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+    return states
 
 
 def sets(values: dict) -> list[str]:

@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from harness import ROOT, Program, fresh_folder, sets
+from harness import PATIENCE, ROOT, Program, fresh_folder, sets
 
 DISKS = ROOT / "cases" / "two_disks.toml"
 SHEAR = ROOT / "cases" / "shear_small.toml"
@@ -128,7 +128,7 @@ def test_info(cairn: Program, here: Path):
 def test_progress_into_a_file(cairn: Program, here: Path):
     with open(here / "log", "w") as log:
         done = subprocess.run(cairn.command("run", DISKS, "--out", "out", *sets({"time.steps": 200})), cwd=here,
-                              stdout=log, stderr=subprocess.STDOUT, timeout=120, check=False)
+                              stdout=log, stderr=subprocess.STDOUT, timeout=120 * PATIENCE, check=False)
     text = (here / "log").read_text()
     lines = text.splitlines()
     expect(done.returncode == 0 and DONE.fullmatch(lines[-1]), text)
@@ -208,7 +208,7 @@ def test_reader_goes_away(cairn: Program, here: Path):
     for name, target in (("pipe", None), ("full", "/dev/full")):
         end = os.open(target, os.O_WRONLY) if target else closed_pipe()
         done = subprocess.run(cairn.command("run", DISKS, "--out", name, *sets({"time.steps": 20})), cwd=here,
-                              stdout=end, stderr=subprocess.PIPE, timeout=60, check=False)
+                              stdout=end, stderr=subprocess.PIPE, timeout=60 * PATIENCE, check=False)
         os.close(end)
         expect(done.returncode >= 0, f"{name}: ended by signal {-done.returncode}")
         rows = (here / name / "history.csv").read_text().splitlines()

@@ -13,13 +13,13 @@ import sys
 import time
 from pathlib import Path
 
-from harness import ROOT, Done, Program, fresh_folder, load_compare_runs, sets
+from harness import PATIENCE, ROOT, Done, Program, fresh_folder, load_compare_runs, sets
 
 compare_runs = load_compare_runs()
 import h5py  # noqa: E402  after the check that it is there
 
 FAILED = 3
-PATIENCE = 120  # seconds for one run
+LIMIT = 120  # seconds for one run
 NO_SPACE = "No space left on device"
 CASE = ROOT / "cases" / "shear_small.toml"
 # Everything off but what a test turns on.
@@ -89,7 +89,7 @@ def full_at(kind: str, cairn: Program, scratch: Path, ranks: int) -> list[str]:
     settings, problems = QUIET | more, []
     whole = scratch / f"whole_{kind}"
     if not whole.exists():
-        cairn("run", CASE, "--out", whole, *sets(settings), timeout=PATIENCE)
+        cairn("run", CASE, "--out", whole, *sets(settings), timeout=LIMIT)
     with SmallDisk(scratch / f"disk_{kind}_{ranks}", 16 << 20) as disk:
         if not disk.mounted:
             return [f"{kind}: no file system could be mounted"]
@@ -99,18 +99,18 @@ def full_at(kind: str, cairn: Program, scratch: Path, ranks: int) -> list[str]:
         full = settings | ({"time.steps": 400, "output.checkpoint": "{}"} if started else {})
         if started:
             start = settings | {"time.steps": 20}
-            first = cairn("run", CASE, "--out", out, *sets(start), ranks=ranks, timeout=PATIENCE)
+            first = cairn("run", CASE, "--out", out, *sets(start), ranks=ranks, timeout=LIMIT)
             if first.code != 0:
                 problems.append(f"the start: {first.code} {first.err}")
         disk.leave_free(room)
         restart = ["--restart", "latest"] if started else []
-        done = cairn("run", CASE, "--out", out, *sets(full), *restart, ranks=ranks, timeout=PATIENCE)
+        done = cairn("run", CASE, "--out", out, *sets(full), *restart, ranks=ranks, timeout=LIMIT)
         if done.code != FAILED or NO_SPACE not in done.err or name not in done.err:
             problems.append(f"exit code {done.code}, {done.err}")
         problems += whole_files(out)
         disk.free()
         restart = ["--restart", "latest"] if list(out.glob("checkpoint_*.h5")) else ["--overwrite"]
-        done = cairn("run", CASE, "--out", out, *sets(settings), *restart, ranks=ranks, timeout=PATIENCE)
+        done = cairn("run", CASE, "--out", out, *sets(settings), *restart, ranks=ranks, timeout=LIMIT)
         if done.code != 0:
             problems.append(f"with room again: {done.code}, {done.err}")
         else:
@@ -125,13 +125,13 @@ def full_for_pack(cairn: Program, scratch: Path) -> list[str]:
         table.write_text("as it was")
         disk.leave_free(0)
         arguments = ("pack", ROOT / "cases" / "packs" / "shear36.toml", "-o", table)
-        done = cairn(*arguments, timeout=PATIENCE)
+        done = cairn(*arguments, timeout=LIMIT)
         problems = [] if done.code == FAILED and NO_SPACE in done.err else [f"exit code {done.code}, {done.err}"]
         if table.read_text() != "as it was":
             problems.append("the table that was there is damaged")
         problems += whole_files(disk.folder)[:0] + [f"{f.name} was left" for f in disk.folder.glob(".*")]
         disk.free()
-        done = cairn(*arguments, timeout=PATIENCE)
+        done = cairn(*arguments, timeout=LIMIT)
         if done.code != 0 or not table.read_text().startswith("# 36 grains"):
             problems.append(f"with room again: {done.code} {done.err}")
     return [f"full disk at pack: {p}" for p in problems]
@@ -145,7 +145,7 @@ def full_for_plot(scratch: Path) -> list[str]:
         shutil.copytree(whole, run)
         disk.leave_free(4096)
         plot = [ROOT / "scripts" / "plot", run]
-        done = subprocess.run(plot, capture_output=True, text=True, check=False, timeout=PATIENCE)
+        done = subprocess.run(plot, capture_output=True, text=True, check=False, timeout=LIMIT * PATIENCE)
         if "No module named" in done.stderr or "needs" in done.stderr:
             print(f"plot: left out: {done.stderr.strip()[-100:]}")
             return []
@@ -156,7 +156,7 @@ def full_for_plot(scratch: Path) -> list[str]:
         if left:
             problems.append(f"left {left}")
         disk.free()
-        done = subprocess.run(plot, capture_output=True, text=True, check=False, timeout=PATIENCE)
+        done = subprocess.run(plot, capture_output=True, text=True, check=False, timeout=LIMIT * PATIENCE)
         if done.returncode != 0:
             problems.append(f"with room again: {done.returncode} {done.stderr[-300:]}")
     return [f"full disk at plot: {p}" for p in problems]
@@ -183,7 +183,7 @@ def mixed(cairn: Program, arguments: list, ranks: int, odd: int, prepare: str) -
     for rank in range(ranks):
         command += [":"] * (rank > 0) + ["-n", "1", *(shell if rank == odd else words)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT * PATIENCE, check=False)
     except subprocess.TimeoutExpired:
         return Done("hang", "", "")
     return Done(done.returncode, done.stdout, done.stderr)
@@ -194,7 +194,7 @@ def out_of_memory(cairn: Program, scratch: Path) -> list[str]:
     settings = QUIET | {"time.steps": 20, "domain.cells": "[320, 320]", "solver.points_per_cell": 9}
     problems, codes = [], []
     whole = scratch / "memory"
-    done = cairn("run", CASE, "--out", whole, *sets(settings), ranks=2, timeout=PATIENCE)
+    done = cairn("run", CASE, "--out", whole, *sets(settings), ranks=2, timeout=LIMIT)
     if done.code != 0:
         return [f"memory: {done.code} {done.err}"]
     # From too little to start with to enough; where reading fails lies between.
@@ -240,25 +240,25 @@ def one_rank_killed(cairn: Program, scratch: Path) -> list[str]:
         command = cairn.command("run", CASE, "--out", out, *sets(settings), ranks=3)
         with open(scratch / f"killed_{victim}.log", "wb") as log:
             process = subprocess.Popen(command, stdout=log, stderr=log)
-            limit = time.monotonic() + PATIENCE
+            limit = time.monotonic() + LIMIT * PATIENCE
             while len(list(out.glob("checkpoint_*.h5"))) < 2 and process.poll() is None and time.monotonic() < limit:
                 time.sleep(0.05)
             ranks = [pid for pid in children(process.pid) if "cairn" in Path(f"/proc/{pid}/comm").read_text()]
             os.kill(sorted(ranks)[victim], signal.SIGKILL)
             try:
-                code = process.wait(timeout=30)
+                code = process.wait(timeout=30 * PATIENCE)
             except subprocess.TimeoutExpired:
                 process.kill()
                 code = "hang"
         if code in (0, "hang"):
             problems.append(f"rank {victim} killed: exit code {code}")
-        limit = time.monotonic() + 10
+        limit = time.monotonic() + 10 * PATIENCE
         while any(map(alive, ranks)) and time.monotonic() < limit:
             time.sleep(0.1)
         if any(map(alive, ranks)):
             problems.append(f"rank {victim} killed: other ranks go on")
         done = cairn("run", CASE, "--out", out, *sets(settings | {"time.wall_limit": 0.5}), "--restart", "latest",
-                     ranks=2, timeout=PATIENCE)
+                     ranks=2, timeout=LIMIT)
         if done.code != 4:
             problems.append(f"rank {victim} killed: cannot go on: {done.code} {done.err}")
     return problems

@@ -9,7 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from harness import ROOT, SKIP, Program, fresh_folder, sets
+from harness import PATIENCE, ROOT, SKIP, Program, fresh_folder, sets
 
 for package in ("numpy", "h5py", "matplotlib"):
     if importlib.util.find_spec(package) is None:
@@ -91,7 +91,7 @@ def write_run(folder: Path, title: str, band: tuple[float, float], plastic: floa
 
 def plot(*arguments) -> str:
     command = [ROOT / "scripts" / "plot", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300 * PATIENCE, check=False)
     assert done.returncode == 0, f"exit code {done.returncode}\n{done.stdout}\n{done.stderr}"
     return done.stdout
 

@@ -17,7 +17,7 @@ import sys
 import time
 from pathlib import Path
 
-from harness import ROOT, Program, fresh_folder, load_compare_runs, sets
+from harness import PATIENCE, ROOT, Program, fresh_folder, load_compare_runs, sets
 
 compare_runs = load_compare_runs()
 import h5py  # noqa: E402  after the check that it is there
@@ -111,7 +111,7 @@ def start(bench: Bench, out: Path, ranks: int, *more) -> subprocess.Popen:
 def wait_for_rows(process: subprocess.Popen, out: Path, rows: int) -> None:
     """Until history.csv has grown by so many bytes, or the run has ended."""
     size = lambda: (out / "history.csv").stat().st_size if (out / "history.csv").exists() else 0  # noqa: E731
-    began, limit = size(), time.monotonic() + 30
+    began, limit = size(), time.monotonic() + 30 * PATIENCE
     while size() < began + rows and process.poll() is None and time.monotonic() < limit:
         time.sleep(0.005)
 
@@ -123,7 +123,7 @@ def signals(bench: Bench, whole: Path) -> None:
         process = start(bench, out, ranks, *more)
         wait_for_rows(process, out, bench.random.randrange(2000, 12000))
         process.send_signal(number)
-        text, errors = process.communicate(timeout=60)
+        text, errors = process.communicate(timeout=60 * PATIENCE)
         what = f"{number.name} on {ranks} ranks"
         bench.expect(process.returncode == STOPPED, f"{what}: exit code {process.returncode} {errors}")
         bench.expect(f"stopped by {number.name}" in text and "--restart latest" in text.splitlines()[-1],
@@ -133,7 +133,7 @@ def signals(bench: Bench, whole: Path) -> None:
     done = bench.run(SHEAR, LONG_SETS, out, "--set", "time.wall_limit=0.3", "--restart", "latest")
     bench.expect(done.code == STOPPED and "time.wall_limit" in done.out, f"wall limit: {done.code} {done.err}")
     command = text.splitlines()[-1].removeprefix("resume with: ")
-    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=120 * PATIENCE, check=False)
     bench.expect(done.returncode == 0, f"resumed: {done.returncode} {done.stderr}")
     bench.same(whole, out, "after four signals and a wall limit")
 
@@ -164,7 +164,7 @@ def kill(process: subprocess.Popen) -> None:
 def kills(bench: Bench, whole: Path) -> None:
     """Killed at random moments again and again; what has its final name is whole each time."""
     out, count = bench.scratch / "kills", 100 if bench.soak else 10
-    killed = 0
+    killed = writing = 0  # while a checkpoint was being written
     while killed < count:
         more = ["--restart", "latest"] if checkpoints(out) else ["--overwrite"] if out.exists() else []
         process = start(bench, out, bench.random.choice((1, 1, 2)), *more)
@@ -179,6 +179,7 @@ def kills(bench: Bench, whole: Path) -> None:
             continue
         kill(process)
         killed += 1
+        writing += any(out.glob(".checkpoint_*.part"))
         for file in [*out.glob("*.h5"), *out.glob("*.vtkhdf")]:
             try:
                 h5py.File(file).close()
@@ -188,6 +189,8 @@ def kills(bench: Bench, whole: Path) -> None:
     done = bench.run(SHEAR, LONG_SETS, out, *more)
     bench.expect(done.code == 0, f"after all kills: {done.code} {done.err}")
     bench.same(whole, out, f"after {killed} kills")
+    print(f"{killed} kills, {writing} of them while a checkpoint was being written", flush=True)
+    bench.expect(writing > 0 or not bench.soak, "no kill came while a checkpoint was being written")
 
 
 def damage(bench: Bench, whole: Path) -> None:

@@ -12,10 +12,12 @@ namespace cairn {
 
 /// Sums over a patch's points and the nodes that it answers for, since the start.
 struct PatchLedger {
-  double contact_dissipation = 0;    // [J]
-  double boundary_work = 0;          // done by faces, walls and rigid bodies on deformable ones [J]
-  double numerical_dissipation = 0;  // taken from the points by relaxing their spin and by blending with PIC [J]
-  std::int64_t contact_nodes = 0;    // nodes with a contact impulse in the last step
+  double contact_dissipation = 0;  // [J]
+  double boundary_work = 0;        // done by faces, walls and rigid bodies on deformable ones [J]
+  // Taken from velocities by blending with PIC, and what spins had at the start and were given by the nodes [J]. Less
+  // what spins have now, it is what was lost: by blending, by relaxing spins, and as their inertia changes.
+  double blended_and_spun = 0;
+  std::int64_t contact_nodes = 0;  // nodes with a contact impulse in the last step
 };
 
 /// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared.

@@ -29,7 +29,7 @@ struct Totals {
   double kinetic = 0, strain = 0, potential = 0, plastic = 0;  // [J]; rigid bodies are left out
   double viscous = 0;                                          // [J], dissipated in the material; likewise
   double contact_dissipation = 0, boundary_work = 0;           // [J], since the start
-  double numerical = 0;                                        // [J], PatchLedger::numerical_dissipation
+  double numerical = 0;                                        // [J], lost by blending with PIC and in spins
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0;                                             // [kg]
   double contact_nodes = 0;

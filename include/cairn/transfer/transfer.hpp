@@ -67,7 +67,7 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
 /// at the node, and too slow at its surface. Points that carry an angular velocity w give the nodes
 /// m N (v + w x arm), arm = node minus point, which is exact for rigid motion (as in APIC, Jiang et al. 2015); they
 /// take it up as FLIP does, by the transpose of that sum, so that neither energy nor angular momentum is lost.
-/// Returns the energy [J] that blending with PIC and the relaxation of spin take.
+/// Returns the energy [J] that blending with PIC takes from the velocities and the nodes give to the spins.
 template <int Dim>
 double accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density,
                   double dt);
