@@ -10,6 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import NullLocator
 
 
 @dataclasses.dataclass
@@ -51,6 +52,9 @@ def draw_panels(path: Path, title: str, panels: list[Panel], columns: int = 3) -
         if panel.logarithmic:
             axes.set_xscale("log")
             axes.set_yscale("log")
+            sizes = sorted({float(size) for curve in panel.curves for size in curve.x})
+            axes.set_xticks(sizes, [f"1/{round(1 / size)}" for size in sizes])
+            axes.xaxis.set_minor_locator(NullLocator())
         axes.set_title(panel.title, fontsize=9)
         axes.set_xlabel(panel.x_label)
         axes.set_ylabel(panel.y_label)

@@ -27,7 +27,7 @@ SIZES = {36: (0.4e-3, (50, 100), ("shear_small", "shear_small")),
          369: (1.2e-3, (75, 150), ("shear", "shear_noslip"))}
 PAPER_GRID = 150
 STAGES = (0.25, 0.50, 0.75)  # of shear
-BAND_SHARE = 0.90  # of the displacement, carried by the shear band
+BANDS = {"two thirds": 2 / 3, "nine tenths": 0.90}  # of the displacement, carried by the shear band
 QUIET = {"output.grains": "{}", "output.contacts": "{}", "output.checkpoint": "{}"}
 
 
@@ -135,11 +135,11 @@ def plastic_work(folder: Path, side: float, shear: float) -> float:
     return at_time(history(folder), "plastic_dissipation", shear * side / SPEED)
 
 
-def band_width(folder: Path, side: float) -> float:
-    """Width of the shear band at 75 %, in mean diameters of the grains; NaN where there is none."""
+def band_width(folder: Path, side: float, share: float) -> float:
+    """Width that carries a share of the displacement at 75 %, in mean diameters of the grains; NaN where none does."""
     results = Results(folder)
     frame = min(results.frames, key=lambda frame: abs(frame.time - STAGES[-1] * side / SPEED))
-    band = shear_band(*column_profile(results, frame), SPEED * frame.time, BAND_SHARE)
+    band = shear_band(*column_profile(results, frame), SPEED * frame.time, share)
     return (band[1] - band[0]) / results.mean_diameter() if band else float("nan")
 
 
@@ -167,7 +167,8 @@ def checks(folders: Folders) -> list[Check]:
                     error = np.abs(history(folder)["energy_error"]).max()
                     found.append(below(case, "largest energy_error", error, 0.01))
                     if shear > STAGES[0]:
-                        found.append(record(case, "shear band at 75 % [mean diameters]", band_width(folder, side)))
+                        found += [record(case, f"{name} of the displacement at 75 % within [mean diameters]",
+                                         band_width(folder, side, share)) for name, share in BANDS.items()]
                         work[count, kind, cells] = plastic_work(folder, side, STAGES[-1])
                     if shear > STAGES[0] and (count, cells) == (369, PAPER_GRID):
                         found += whole(case, folder, count, side, side / cells)
