@@ -24,8 +24,8 @@ enum class Partition { metis, round_robin };
 
 struct ParallelOptions {
   Partition partition = Partition::metis;
-  int balance_every = 200;  // steps between looks at the balance; 0: never
-  double imbalance = 1.1;   // largest over mean work of the ranks from which patches are dealt out anew
+  int balance_every = 50;  // steps between looks at the balance; 0: never
+  double imbalance = 1.1;  // largest over mean work of the ranks from which patches are dealt out anew
 };
 
 struct SolverOptions {
