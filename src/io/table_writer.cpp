@@ -47,6 +47,12 @@ std::filesystem::path folder_of(const std::filesystem::path& file) {
   return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
+/// Has the disk hold the name of a file. Some file systems cannot flush a folder; the file is whole in any case.
+void flush_name(const std::filesystem::path& file) {
+  const PosixFile folder(folder_of(file), O_RDONLY | O_DIRECTORY);
+  if (folder.valid()) folder.flush();
+}
+
 }  // namespace
 
 std::vector<RowBlocks::Block> merged_blocks(const RowBlocks& rows) {
@@ -89,9 +95,7 @@ std::string write_failure(const std::filesystem::path& file, const std::string& 
 std::string flush_to_disk(const std::filesystem::path& file) {
   const PosixFile open(file, O_RDWR);
   if (!open.valid() || !open.flush()) return write_failure(file, "flushing to disk", std::strerror(errno));
-  // Some file systems cannot flush a folder; the file is whole in any case.
-  const PosixFile folder(folder_of(file), O_RDONLY | O_DIRECTORY);
-  if (folder.valid()) folder.flush();
+  flush_name(file);
   return {};
 }
 
@@ -103,7 +107,8 @@ std::string rename_to(const std::filesystem::path& temporary, const std::filesys
 std::string publish(const std::filesystem::path& temporary, const std::filesystem::path& file) {
   std::string error = flush_to_disk(temporary);
   if (error.empty()) error = rename_to(temporary, file);
-  return error.empty() ? flush_to_disk(file) : error;
+  if (error.empty()) flush_name(file);
+  return error;
 }
 
 TableWriter::TableWriter(std::filesystem::path file, MPI_Comm comm, std::int64_t bytes)
@@ -205,7 +210,6 @@ void TableWriter::check(const std::string& path, const RowBlocks& rows, int comp
 
 void TableWriter::write_blocks(const std::string& path, int components, const RowBlocks& rows, hid_t type,
                                std::size_t value_bytes, const BlockSource<std::byte>& values) {
-  check(path, rows, components, static_cast<std::size_t>(rows.local_rows() * components));
   const std::int64_t place = lay_out(path, components, rows.total_rows, type);
   const std::int64_t row_bytes = components * static_cast<std::int64_t>(value_bytes);
   bool good = true;

@@ -51,14 +51,15 @@ class TableWriter {
     check(path, rows, components, values.size());
     const RowBlocks merged{merged_blocks(rows), rows.total_rows};
     std::size_t at = 0;
-    write<T>(path, components, merged, [&](std::size_t block) {
+    write_blocks(path, components, merged, hdf5::native_type<T>(), sizeof(T), [&](std::size_t block) {
       const auto size = static_cast<std::size_t>(merged.blocks[block].count * components);
-      return values.subspan(std::exchange(at, at + size), size);
+      return std::as_bytes(values.subspan(std::exchange(at, at + size), size));
     });
   }
   /// Likewise, block by block.
   template <class T>
   void write(const std::string& path, int components, const RowBlocks& rows, const BlockSource<T>& values) {
+    check(path, rows, components, static_cast<std::size_t>(rows.local_rows() * components));
     write_blocks(path, components, rows, hdf5::native_type<T>(), sizeof(T),
                  [&](std::size_t block) { return std::as_bytes(values(block)); });
   }
