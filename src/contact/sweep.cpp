@@ -91,9 +91,13 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const Lattice<Dim>
     slot = static_cast<std::int32_t>(shared_.size()) - 1;
   });
   entries_.assign(total, {});
+  turning_.clear();
   std::vector<int> filled(shared_.size(), 0);
   for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
     const auto& piece = patch.pieces[k];
+    const Body& body = bodies[piece.body];
+    const bool turns = body.rigid && body.angular_velocity != Vec3::Zero();
+    if (turns) turning_.push_back(body);
     int node = 0;
     for_each_row(piece.nodes.box, box_, [&](int row, int n) {
       for (int i = 0; i < n; ++i, ++node) {
@@ -102,7 +106,8 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const Lattice<Dim>
         const double mass = sums_at(piece, node)[NodeSums<Dim>::mass];
         if (!(mass > 0)) continue;
         auto& entry = entries_[shared_[shared].first + filled[shared]++];
-        entry.piece = static_cast<int>(k), entry.node = node, entry.mass = mass, entry.rigid = bodies[piece.body].rigid;
+        entry.piece = static_cast<int>(k), entry.node = node, entry.mass = mass, entry.rigid = body.rigid;
+        if (turns) entry.turning = static_cast<int>(turning_.size()) - 1;
       }
     });
   }
@@ -243,7 +248,7 @@ void ContactSweep<Dim>::resolve(const SharedNode& node, const Lattice<Dim>& latt
   double mass = 0;
   Vec<Dim> momentum = Vec<Dim>::Zero(), force = Vec<Dim>::Zero();
   for (int i = 0; i < node.count; ++i) mass += entry[i].mass, momentum += momenta_[i], force += forces_[i];
-  if (partner.rigid) mass = partner.mass, momentum = momenta_[node.partner], force.setZero();
+  if (partner.rigid) mass = partner.mass, momentum = momenta_[node.partner], force = forces_[node.partner];
   const bool own = settings.options.normal_choice == NormalChoice::own;
   Vec<Dim> sum = Vec<Dim>::Zero();
   for (int i = 0; i < node.count; ++i) {
@@ -271,7 +276,12 @@ void ContactSweep<Dim>::load_node(const SharedNode& node, const Patch<Dim>& patc
     const double* momentum = sums_at(patch.pieces[entry.piece], entry.node) + NodeSums<Dim>::momentum;
     forces_[i] = ConstNode<Dim>(nodes.force.data() + static_cast<std::size_t>(entry.node) * vector_width);
     momenta_[i] = ConstNode<Dim>(pass == Pass::repeat ? velocity : momentum);
-    if (pass == Pass::second && !entry.rigid) momenta_[i] += dt * forces_[i];
+    if (entry.rigid) forces_[i].setZero();
+    if (entry.turning >= 0) {
+      const auto course = contact::course_of<Dim>(turning_[entry.turning], momenta_[i] / entry.mass, dt);
+      momenta_[i] = entry.mass * course.velocity, forces_[i] = entry.mass / dt * course.change;
+    }
+    if (pass == Pass::second || (pass == Pass::repeat && entry.rigid)) momenta_[i] += dt * forces_[i];
   }
 }
 
@@ -302,7 +312,10 @@ void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& latti
     bool touched = false;
     for (int i = 0; i < node.count; ++i) {
       auto& entry = entries_[node.first + i];
-      if (entry.rigid) continue;
+      if (entry.rigid) {  // its work is counted with the mean over the step
+        entry.record.projected += 0.5 * dt * forces_[i];
+        continue;
+      }
       auto& piece = patch.pieces[entry.piece];
       if (only_first) {  // its impulse goes to the points, and no longer to the nodes
         impulses_[i] = entry.record.first;

@@ -273,8 +273,6 @@ void check_pressures(const Draft& draft, Errors& errors) {
       problem = fmt::format("the model {} of the body's material carries no stress", in_quotes(law->name));
     else if (material.plane == Plane::stress)
       problem = "the body's material is in plane stress, which a hydrostatic pressure is not";
-    else if (std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, i, c.domain); }))
-      problem = "the body is moved by a drive and carries no stress";
     if (problem.empty()) continue;
     errors.add({body.source, 0}, "initial_pressure", problem + "; remove this key or set it to 0");
     ++reported;

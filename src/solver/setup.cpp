@@ -137,7 +137,7 @@ class Filler {
       const Vec3 omega = body.rigid ? body.angular_velocity : spec.angular_velocity;
       const Vec3 v = (body.rigid ? body.velocity : spec.velocity) + omega.cross(x - shift - body.centre);
       for (int c = 0; c < points.columns(); ++c) points.column(c)[p] = 0;
-      const double pressure = body.rigid ? 0.0 : spec.initial_pressure;
+      const double pressure = spec.initial_pressure;
       if (b != filled) initial = InitialState(materials_[body.material].law, pressure), filled = b;
       for (int i = 0; i < 3; ++i) {
         points.column(C::deformation + tensor_index<Dim>(i, i))[p] = std::cbrt(initial.volume_ratio);
@@ -240,6 +240,8 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
   for (int d = 0; d < Dim; ++d)
     for (int side = 0; side < 2; ++side) transfer_.mirrored[d][side] = faces_[2 * d + side].type == FaceType::symmetry;
+  transfer_of_turning_ = transfer_;
+  transfer_of_turning_.spin = true;
   if (from)
     restore(*from);
   else

@@ -104,7 +104,7 @@ void Simulation<Dim>::project_points(Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::project);
   for_pieces(patch, {{C::position, C::state}}, [&](Piece<Dim>& piece) {
     lay_out_nodes(piece, lattice_, transfer_);
-    project(piece, lattice_, transfer_, material_of(piece).density);
+    project(piece, lattice_, transfer_of(piece), material_of(piece).density);
   });
 }
 
@@ -165,7 +165,7 @@ void Simulation<Dim>::accelerate_points(Patch<Dim>& patch) {
   for_pieces(patch, {{C::position, C::deformation}, {C::volume, C::state}}, [&](Piece<Dim>& piece) {
     const double density = material_of(piece).density;
     if (is_rigid(piece))
-      project_momentum(piece, lattice_, transfer_, density);
+      project_momentum(piece, lattice_, transfer_of(piece), density);
     else
       patch.ledger.blended_and_spun += accelerate_and_project(piece, lattice_, transfer_, density, dt_);
   });
@@ -195,6 +195,7 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
   for_pieces(patch, {{C::position, strained ? C::deformation : all_columns}}, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
     if (is_rigid(piece)) {
+      turn_stress(piece);
       move_rigid(piece);
     } else if (strained) {
       patch.ledger.blended_and_spun += accelerate_and_move(piece, lattice_, transfer_, material.density, dt_, speeds_);
@@ -206,6 +207,18 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
       update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
     }
   });
+}
+
+/// The stress of a driven body turns with it: its nodes have the velocity of the rigid motion, whose gradient is its
+/// spin.
+template <int Dim>
+void Simulation<Dim>::turn_stress(Piece<Dim>& piece) {
+  const auto& material = material_of(piece);
+  if (material.rigid || !turns_rigidly(piece)) return;
+  velocity_from_sums(piece);
+  SpeedLimits unlimited;  // no wave runs through it
+  update_stress(piece, lattice_, transfer_, material.law, material.density, dt_, unlimited);
+  if (!std::isfinite(unlimited.wave)) speeds_.wave = unlimited.wave;
 }
 
 /// Points of a rigid body turn about its centre, which moves with the body's velocity.

@@ -152,6 +152,22 @@ void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
 }
 
 template <int Dim>
+void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                   const Law& law, double density, double dt, SpeedLimits& speeds) {
+  double fastest = speeds.wave * speeds.wave;
+  std::visit(
+      [&](const auto& any) {
+        const auto& concrete = law_of_step(any, dt);
+        for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+          const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
+          fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
+        });
+      },
+      law);
+  speeds.wave = std::sqrt(fastest);
+}
+
+template <int Dim>
 void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                              const Law& law, double density, double dt, SpeedLimits& speeds) {
   double fastest = speeds.wave * speeds.wave;
@@ -302,6 +318,8 @@ void velocity_from_motion(Piece<Dim>& piece) {
 #define CAIRN_INSTANTIATE(Dim)                                                                                        \
   template void update_stress_and_move(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,    \
                                        double, double, double, SpeedLimits&);                                         \
+  template void update_stress(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&, double,     \
+                              double, SpeedLimits&);                                                                  \
   template void update_stress_and_force(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, const Law&,   \
                                         double, double, SpeedLimits&);                                                \
   template double accelerate(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&, double, double);         \

@@ -8,6 +8,7 @@
 /// bodies. With own normals each body meets the rest of the node along its own normal, as the papers print it.
 
 #include "cairn/body/patch.hpp"
+#include "cairn/contact/course.hpp"
 #include "cairn/contact/laws.hpp"
 #include "cairn/contact/ledger.hpp"
 
@@ -44,6 +45,7 @@ struct ContactEntry {
   int piece = 0, node = 0;  // position in the patch's pieces, offset in the piece's box
   double mass = 0;
   bool rigid = false;
+  int turning = -1;   // a rigid body that turns: its position in ContactSweep::turning_
   bool open = false;  // contact is possible (not: too little there, too far apart, no normal)
   contact::Decision decision;
   bool compressive = false, stress_free = false;
@@ -101,6 +103,7 @@ class ContactSweep {
   std::vector<double> volume_;
   std::vector<SharedNode> shared_;
   std::vector<ContactEntry<Dim>> entries_;
+  std::vector<Body> turning_;                          // the rigid bodies among them that turn
   std::vector<Vec<Dim>> momenta_, forces_, impulses_;  // of the node in hand
 };
 

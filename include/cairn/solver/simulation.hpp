@@ -173,7 +173,15 @@ class Simulation {
           migration_->start();
         });
   }
+  void turn_stress(Piece<Dim>& piece);
   void move_rigid(Piece<Dim>& piece);
+  bool turns_rigidly(const Piece<Dim>& piece) const {
+    return is_rigid(piece) && bodies_[piece.body].angular_velocity != Vec3::Zero();
+  }
+  /// Points of rigid bodies that turn always carry spin, so that nodes have exactly the body's motion.
+  const TransferSettings<Dim>& transfer_of(const Piece<Dim>& piece) const {
+    return turns_rigidly(piece) ? transfer_of_turning_ : transfer_;
+  }
   void look_for_fault(int urgency);
   void start_speed_reduction();
   void finish_speed_reduction();
@@ -184,7 +192,7 @@ class Simulation {
   ParallelOptions parallel_;
   Time limits_;
   Lattice<Dim> lattice_;
-  TransferSettings<Dim> transfer_;
+  TransferSettings<Dim> transfer_, transfer_of_turning_;
   ContactSettings<Dim> contact_;
   FaceConditions<Dim> faces_;
   std::vector<SolverMaterial> materials_;

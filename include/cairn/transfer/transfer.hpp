@@ -55,6 +55,11 @@ template <int Dim>
 void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                             const Law& law, double density, double strain_dt, double dt, SpeedLimits& speeds);
 
+/// nodes -> points: strain over `dt` from the nodal velocity, deformation gradient and stress, and nothing else.
+template <int Dim>
+void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+                   const Law& law, double density, double dt, SpeedLimits& speeds);
+
 /// nodes -> points: strain over `dt`, deformation gradient and stress; points -> nodes: the force of the new stress, in
 /// the same pass. Raises `speeds.wave`.
 template <int Dim>

@@ -1,8 +1,10 @@
 """Turning: a free elastic disk keeps its angular momentum; stressed points and bodies keep stress and volume.
 
-Stress and volume are looked at in three ways. A single point under each law is turned in 1000 steps a turn. A disk
-that spins freely, its breathing damped, carries the stress of its own spin, rho w^2 R^2. A disk that is put under
-pressure and glued to a ring, turned slowly, is held by it: its inertia is a thousandth of the pressure.
+Stress and volume are looked at in four ways. A single point under each law is turned in 1000 steps a turn. Bodies of
+which every point is driven go through whole steps of the solver: by the program under pressure, and in a unit test
+under random strains of 3 %. A disk that spins freely, its breathing damped, carries the stress of its own spin,
+rho w^2 R^2. A disk that is put under pressure and glued to a ring, turned slowly, is held by it: its inertia is a
+thousandth of the pressure.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ INVARIANTS = ("pressure", "von Mises stress", "det F")
 MANY = f"spinning, {LAWS[0]}, 16 points a cell"
 SLOW = 2.0  # spin of the disk in the ring [rad/s]
 SAMPLES = 25  # outputs in a turn
-POINT = "material point"
+# Unit tests that print how far stressed points, alone and in driven bodies, drift.
+POINT, STRAINED = "material point", "driven, strained at random"
+TOOLS = {POINT: ("tests/test_material", "--gtest_filter=Objectivity.*"),
+         STRAINED: ("tests/test_solver", "--gtest_filter=DrivenStress.*")}
 # A line for each law in 2D, 3D and plane stress, at strains of 0.01 and 3 %.
 DRIFT = re.compile(r"^\d-D (\w+) .*: det F (\S+), pressure (\S+), deviator (\S+), det (\S+)$", re.M)
 
@@ -53,8 +58,14 @@ def pressed(cfl: float) -> Run:
     return Run("validation/turning_disk", {"time.cfl": cfl}, 4.0 / cfl)
 
 
+def driven(law: str) -> Run:
+    """Every point is driven: the disk as well as the ring."""
+    return Run("validation/turning_disk", {"drive.0.ids": [0, 1], "materials.rubber.model": f'"{law}"'}, 0.2)
+
+
 def runs(full: bool) -> dict[str, Run]:
-    found = {POINT: Run(tool=("tests/test_material", "--gtest_filter=Objectivity.*"))}
+    found = {name: Run(tool=tool) for name, tool in TOOLS.items()}
+    found |= {f"driven, {law}": driven(law) for law in LAWS}
     found |= {f"free, R/{cells}": free(cells) for cells in (CELLS if full else CELLS[:2])}
     found |= {f"spinning, {law}": spinning(law) for law in LAWS}
     if full:
@@ -99,16 +110,20 @@ def invariants(folder: Path, radius: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array(times) - times[0], np.array(values)
 
 
+def in_ring(name: str) -> bool:
+    return name.startswith(("pressed", "driven"))
+
+
 def stressed(name: str, folder: Path) -> tuple[np.ndarray, np.ndarray]:
     """Turns, and the invariants there of the points that are more than a cell from the edge."""
-    slow = name.startswith("pressed")
+    slow = in_ring(name)
     times, values = invariants(folder, (0.375 if slow else RADIUS) - CELL)
     return times * (SLOW if slow else SPIN) / (2 * math.pi), values
 
 
 def scale_of(name: str, first: np.ndarray) -> np.ndarray:
-    """Over what changes are given: the first turn's values; in a disk that is pressed the pressure is the stress."""
-    return first[[0, 0, 2]] if name.startswith("pressed") else first
+    """Over what changes are given: the first turn's values; in a disk under pressure that is the stress."""
+    return first[[0, 0, 2]] if in_ring(name) else first
 
 
 def check_stressed(name: str, folder: Path) -> list[Check]:
@@ -126,7 +141,7 @@ def check_stressed(name: str, folder: Path) -> list[Check]:
     return found
 
 
-def check_point(folder: Path) -> list[Check]:
+def check_tool(name: str, folder: Path) -> list[Check]:
     """Largest changes on the way for each law, of the stress over its norm, as the unit test prints them."""
     worst: dict[str, list[float]] = {}
     for law, *values in DRIFT.findall((folder / "log.txt").read_text(encoding="utf-8")):
@@ -134,16 +149,16 @@ def check_point(folder: Path) -> list[Check]:
         most = worst.setdefault(law, [0.0, 0.0])
         worst[law] = [max(most[0], volume), max(most[1], *stress)]
     if not worst:
-        return [Check(POINT, "the unit test printed no changes", math.nan)]
-    return [below(f"{POINT}, {law}", f"change of {what} over {TURNS} turns", value, 1e-3)
+        return [Check(name, "the unit test printed no changes", math.nan)]
+    return [below(f"{name}, {law}", f"change of {what} over {TURNS} turns", value, 1e-3)
             for law, most in worst.items() for what, value in zip(("det F", "the stress's invariants"), most)]
 
 
 def checks(folders: Folders) -> list[Check]:
     found = []
     for name, folder in folders.items():
-        if name == POINT:
-            found += check_point(folder)
+        if name in TOOLS:
+            found += check_tool(name, folder)
         elif not name.startswith("free"):
             found += check_stressed(name, folder)
         else:
@@ -163,11 +178,11 @@ def draw(folders: Folders, out: Path) -> list[Path]:
         if name.startswith("free"):
             times, values = angular_momentum(folder)
             momentum.append(Curve(name, times / PERIOD, values))
-        elif name != POINT:
+        elif name not in TOOLS:
             turns, values = stressed(name, folder)
             scale = scale_of(name, values[:SAMPLES].mean(axis=0))
             for k, what in enumerate(INVARIANTS):
-                label = f"{name} (over the pressure)" if k == 1 and name.startswith("pressed") else name
+                label = f"{name} (over the pressure)" if k == 1 and in_ring(name) else name
                 change[what].append(Curve(label, turns, values[:, k] / scale[k]))
     panels = [Panel("free disk", "turns", "angular momentum / initial", momentum)]
     panels += [Panel(f"{what} of disks under stress", "turns", "mean over the points / that of turn 1", curves)
