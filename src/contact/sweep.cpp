@@ -272,10 +272,11 @@ void ContactSweep<Dim>::load_node(const SharedNode& node, const Patch<Dim>& patc
   for (int i = 0; i < node.count; ++i) {
     const auto& entry = entries_[node.first + i];
     const auto& nodes = patch.pieces[entry.piece].nodes;
-    const double* velocity = nodes.velocity.data() + static_cast<std::size_t>(entry.node) * vector_width;
-    const double* momentum = sums_at(patch.pieces[entry.piece], entry.node) + NodeSums<Dim>::momentum;
-    forces_[i] = ConstNode<Dim>(nodes.force.data() + static_cast<std::size_t>(entry.node) * vector_width);
-    momenta_[i] = ConstNode<Dim>(pass == Pass::repeat ? velocity : momentum);
+    const std::size_t vector = static_cast<std::size_t>(entry.node) * vector_width;
+    forces_[i] = ConstNode<Dim>(nodes.force.data() + vector);
+    momenta_[i] =
+        ConstNode<Dim>(pass == Pass::repeat ? nodes.velocity.data() + vector
+                                            : sums_at(patch.pieces[entry.piece], entry.node) + NodeSums<Dim>::momentum);
     if (entry.rigid) forces_[i].setZero();
     if (entry.turning >= 0) {
       const auto course = contact::course_of<Dim>(turning_[entry.turning], momenta_[i] / entry.mass, dt);

@@ -59,16 +59,6 @@ std::size_t NeighbourExchange::slot(int rank) const {
   return static_cast<std::size_t>(at - neighbours_.begin());
 }
 
-void NeighbourExchange::wait() {
-  MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
-  requests_.clear();
-}
-
-void NeighbourExchange::begin() {
-  wait();
-  for (auto& message : outgoing_) message.clear();
-}
-
 void NeighbourExchange::start() {
   requests_.resize(neighbours_.size());
   for (std::size_t i = 0; i < neighbours_.size(); ++i) {
@@ -80,9 +70,12 @@ void NeighbourExchange::start() {
     ++traffic_.messages;
     traffic_.bytes += static_cast<std::int64_t>(words.size()) * 8;
   }
+  std::swap(incoming_.back(), outgoing_.back());
+  under_way_ = true;
 }
 
-void NeighbourExchange::finish() {
+bool NeighbourExchange::receive() {
+  if (!under_way_) return false;
   for (std::size_t i = 0; i < neighbours_.size(); ++i) {
     MPI_Message handle;
     MPI_Status status;
@@ -92,7 +85,10 @@ void NeighbourExchange::finish() {
     incoming_[i].words().resize(static_cast<std::size_t>(count));
     MPI_Mrecv(incoming_[i].words().data(), count, MPI_DOUBLE, &handle, MPI_STATUS_IGNORE);
   }
-  std::swap(incoming_.back(), outgoing_.back());
+  MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
+  for (std::size_t i = 0; i < neighbours_.size(); ++i) outgoing_[i].clear();
+  under_way_ = false;
+  return true;
 }
 
 }  // namespace cairn

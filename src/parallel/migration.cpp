@@ -10,22 +10,6 @@
 namespace cairn {
 namespace {
 
-/// True where every point lies in the patch: what is found almost always, and fast.
-template <int Dim>
-bool all_inside(const Points<Dim>& points, const Lattice<Dim>& lattice, int patch) {
-  for (int d = 0; d < Dim; ++d) {
-    const double* x = points.column(d);
-    const auto [lower, upper] = lattice.patch_reach(patch, d);
-    bool inside = true;
-    for (int p = 0; p < points.size(); ++p) {
-      const double xi = lattice.scaled(d, x[p]);
-      inside &= xi >= lower && xi < upper;  // false for a position that is no number
-    }
-    if (!inside) return false;
-  }
-  return true;
-}
-
 /// The cell of a point (the nearest, for one within half a cell of the domain), its position wrapped at periodic
 /// boundaries; says in `failure` where it lies further outside.
 template <int Dim>
@@ -59,9 +43,23 @@ Index<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& latt
 }  // namespace
 
 template <int Dim>
-void Migration<Dim>::collect_piece(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice) {
+bool all_inside(const Piece<Dim>& piece, const Lattice<Dim>& lattice, int patch) {
+  for (int d = 0; d < Dim; ++d) {
+    const double* x = piece.points.column(d);
+    const auto [lower, upper] = lattice.patch_reach(patch, d);
+    bool inside = true;
+    for (int p = 0; p < piece.points.size(); ++p) {
+      const double xi = lattice.scaled(d, x[p]);
+      inside &= xi >= lower && xi < upper;  // false for a position that is no number
+    }
+    if (!inside) return false;
+  }
+  return true;
+}
+
+template <int Dim>
+void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice) {
   Points<Dim>& points = piece.points;
-  if (all_inside(points, lattice, patch.id)) return;
   std::vector<int> staying;
   std::vector<std::pair<int, int>> leaving;  // patch, point
   for (int p = 0; p < points.size(); ++p) {
@@ -102,13 +100,8 @@ void Migration<Dim>::begin() {
 }
 
 template <int Dim>
-void Migration<Dim>::collect(Patch<Dim>& patch, const Lattice<Dim>& lattice) {
-  for (auto& piece : patch.pieces) collect_piece(patch, piece, lattice);
-}
-
-template <int Dim>
 void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
-  messages_.finish();
+  messages_.receive();
   struct Arrival {
     int to, from, body, count, columns, rank;
     std::size_t at;
@@ -133,7 +126,9 @@ void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
   for (const Arrival& a : arrivals) {
     auto patch =
         std::lower_bound(patches.begin(), patches.end(), a.to, [](const auto& p, int id) { return p.id < id; });
-    Points<Dim>& points = patch->piece_of(a.body, 0).points;
+    Piece<Dim>& piece = patch->piece_of(a.body, 0);
+    piece.projected = false;
+    Points<Dim>& points = piece.points;
     if (points.size() == 0) points = Points<Dim>(a.columns - PointColumns<Dim>::state);
     const Message& message = messages_.incoming(a.rank);
     int p = points.size();
@@ -160,12 +155,15 @@ void sort_by_cell(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Box<Dim>
   }
   std::iota(order.begin(), order.end(), 0);
   if (std::is_sorted(key.begin(), key.end())) return;
+  piece.projected = false;
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return key[a] < key[b]; });
   points.select(order);
 }
 
 template class Migration<2>;
 template class Migration<3>;
+template bool all_inside(const Piece<2>&, const Lattice<2>&, int);
+template bool all_inside(const Piece<3>&, const Lattice<3>&, int);
 template void sort_by_cell(Piece<2>&, const Lattice<2>&, const Box<2>&);
 template void sort_by_cell(Piece<3>&, const Lattice<3>&, const Box<3>&);
 

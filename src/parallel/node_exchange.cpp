@@ -131,13 +131,18 @@ void NodeExchange<Dim>::put_with_boxes(Patch<Dim>& patch, std::size_t p) {
 }
 
 template <int Dim>
-void NodeExchange<Dim>::finish() {
-  messages_.finish();
+void NodeExchange<Dim>::start() {
+  messages_.start();
   in_ = out_;
   if (!in_.with_boxes) return;
   for (auto& list : parts_) list.clear();
   parse(messages_.rank());
-  for (int rank : messages_.neighbours()) parse(rank);
+}
+
+template <int Dim>
+void NodeExchange<Dim>::receive() {
+  if (messages_.receive() && in_.with_boxes)
+    for (int rank : messages_.neighbours()) parse(rank);
 }
 
 template <int Dim>

@@ -246,6 +246,9 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
     restore(*from);
   else
     place_points(c);
+  // As at the end of a step; and the memory of the nodes is there before the first step.
+  for (auto& patch : patches_)
+    for (auto& piece : patch.pieces) project_ahead(piece);
 }
 
 template <int Dim>

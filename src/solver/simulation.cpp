@@ -51,7 +51,7 @@ void Simulation<Dim>::step(double longest) {
   using P = Patch<Dim>;
   const StressUpdate update = solver_.stress_update;
   const bool first = update == StressUpdate::first || update == StressUpdate::both;
-  const bool again = update == StressUpdate::both || update == StressUpdate::modified_last;
+  const bool again = projects_again();
   const double share = update == StressUpdate::both ? 0.5 : 1.0;
 
   choose_time_step(longest);
@@ -100,12 +100,23 @@ void Simulation<Dim>::choose_time_step(double longest) {
 
 template <int Dim>
 void Simulation<Dim>::project_points(Patch<Dim>& patch) {
-  using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::project);
-  for_pieces(patch, {{C::position, C::state}}, [&](Piece<Dim>& piece) {
-    lay_out_nodes(piece, lattice_, transfer_);
-    project(piece, lattice_, transfer_of(piece), material_of(piece).density);
-  });
+  for (auto& piece : patch.pieces)
+    if (!std::exchange(piece.projected, false)) project_piece(piece);
+}
+
+template <int Dim>
+void Simulation<Dim>::project_piece(Piece<Dim>& piece) {
+  lay_out_nodes(piece, lattice_, transfer_);
+  project(piece, lattice_, transfer_of(piece), material_of(piece).density);
+}
+
+/// Projects a piece for the step that comes next.
+template <int Dim>
+void Simulation<Dim>::project_ahead(Piece<Dim>& piece) {
+  const auto time = timers_.measure(Stage::project);
+  project_piece(piece);
+  piece.projected = true;
 }
 
 template <int Dim>
@@ -127,7 +138,10 @@ template <int Dim>
 void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
   using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::stress);
-  for (auto& piece : patch.pieces) velocity_from_sums(piece);
+  for (auto& piece : patch.pieces) {
+    velocities_.lend(piece.nodes.velocity);
+    velocity_from_sums(piece);
+  }
   constrain_velocity(patch, lattice_, faces_, bodies_, false);
   for_pieces(patch, {{C::position, C::velocity}, {C::deformation, all_columns}}, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
@@ -135,6 +149,7 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
       std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
     else
       update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
+    if (!projects_again()) velocities_.take_back(piece.nodes.velocity);
   });
 }
 
@@ -154,7 +169,10 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
     walls_[p].second_pass(patch, faces_, contact_, dt_, last);
   }
   const auto time = timers_.measure(Stage::integrate);
-  for (auto& piece : patch.pieces) integrate(piece, dt_);
+  for (auto& piece : patch.pieces) {
+    motions_.lend(piece.nodes.motion);
+    integrate(piece, dt_);
+  }
   constrain_motion(patch, lattice_, faces_, bodies_, dt_, last);
 }
 
@@ -186,27 +204,44 @@ void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
   for (auto& piece : patch.pieces) centre_motion(piece);
 }
 
-/// The last pass over the points: what is left to do with them, and they move.
+/// The last pass over the points: what is left to do with them, and they move. Those that left the patch are taken out;
+/// a piece that kept all of its points is projected for the next step at once, while they are in the cache.
 template <int Dim>
 void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
   using C = PointColumns<Dim>;
   const bool strained = solver_.stress_update == StressUpdate::first;
   const auto time = timers_.measure(strained ? Stage::update : Stage::stress);
-  for_pieces(patch, {{C::position, strained ? C::deformation : all_columns}}, [&](Piece<Dim>& piece) {
-    const auto& material = material_of(piece);
-    if (is_rigid(piece)) {
-      turn_stress(piece);
-      move_rigid(piece);
-    } else if (strained) {
-      patch.ledger.blended_and_spun += accelerate_and_move(piece, lattice_, transfer_, material.density, dt_, speeds_);
+  for_pieces(patch, {{C::position, strained ? C::state : all_columns}}, [&](Piece<Dim>& piece) {
+    finish_piece(patch, piece, share);
+    if (!projects_again()) motions_.take_back(piece.nodes.motion), velocities_.take_back(piece.nodes.velocity);
+    if (all_inside(piece, lattice_, patch.id)) {
+      project_ahead(piece);
     } else {
-      if (solver_.stress_update == StressUpdate::last) {
-        patch.ledger.blended_and_spun += accelerate(piece, lattice_, transfer_, material.density, dt_);
-        velocity_from_motion(piece);
-      }
-      update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
+      const auto time = timers_.measure(Stage::migrate);
+      migration_->collect(patch, piece, lattice_);
     }
   });
+}
+
+template <int Dim>
+void Simulation<Dim>::finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share) {
+  const auto& material = material_of(piece);
+  double& lost = patch.ledger.blended_and_spun;
+  if (is_rigid(piece)) {
+    turn_stress(piece);
+    move_rigid(piece);
+    return;
+  }
+  if (solver_.stress_update == StressUpdate::first) {
+    lost += accelerate_and_move(piece, lattice_, transfer_, material.density, dt_, speeds_);
+    return;
+  }
+  if (solver_.stress_update == StressUpdate::last) {
+    lost += accelerate(piece, lattice_, transfer_, material.density, dt_);
+    velocities_.lend(piece.nodes.velocity);
+    velocity_from_motion(piece);
+  }
+  update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
 }
 
 /// The stress of a driven body turns with it: its nodes have the velocity of the rigid motion, whose gradient is its
@@ -215,6 +250,7 @@ template <int Dim>
 void Simulation<Dim>::turn_stress(Piece<Dim>& piece) {
   const auto& material = material_of(piece);
   if (material.rigid || !turns_rigidly(piece)) return;
+  velocities_.lend(piece.nodes.velocity);
   velocity_from_sums(piece);
   SpeedLimits unlimited;  // no wave runs through it
   update_stress(piece, lattice_, transfer_, material.law, material.density, dt_, unlimited);

@@ -65,12 +65,12 @@ Row load_row(const double* rows, int node) {
   else
     return load(rows + node * 8);
 }
-template <class Row>
+template <int stride, class Row>
 void add_row(double* rows, int node, Row row) {
   if constexpr (row_width<Row> == 4)
-    store4(rows + node * 4, load4(rows + node * 4) + row);
+    store4(rows + node * stride, load4(rows + node * stride) + row);
   else
-    store(rows + node * 8, load(rows + node * 8) + row);
+    store(rows + node * stride, load(rows + node * stride) + row);
 }
 
 inline constexpr int no_gradient = -1;
@@ -95,8 +95,8 @@ Row momentum_row(const double (&p)[Dim]) {
 }
 
 /// Adds N times `value` to the rows of a point's nodes; in the columns from `gradient` on, grad N takes the place of N.
-/// `turn[d]` times the arm along d is added to `value` first (with spin).
-template <int gradient, class Row, int Dim, class Shape>
+/// `turn[d]` times the arm along d is added to `value` first (with spin). Rows begin `stride` numbers apart.
+template <int gradient, class Row, int stride = row_width<Row>, int Dim, class Shape>
 void scatter(const Stencil<Dim, Shape>& stencil, int lane, const Row& value, const Row (&turn)[Dim], double* rows) {
   using S = Stencil<Dim, Shape>;
   const auto x = stencil.along_x(lane);
@@ -115,7 +115,7 @@ void scatter(const Stencil<Dim, Shape>& stencil, int lane, const Row& value, con
     for (int i = 0; i < S::n; ++i) {
       Row given = sum * factor[i];
       if constexpr (S::spinning) given += turn[0] * (row.value * x.lever[i]);
-      add_row(rows, node + i, given);
+      add_row<stride>(rows, node + i, given);
     }
   });
 }
@@ -241,7 +241,7 @@ struct PointForce {
       Lanes4 by_value = weight * row.value;
       for (int j = 1; j < Dim; ++j) by_value += columns[j] * row.slope[j];
       for (int i = 0; i < Stencil<Dim, Shape>::n; ++i)
-        add_row(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
+        add_row<vector_width>(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
     });
   }
 };

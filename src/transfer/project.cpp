@@ -29,6 +29,7 @@ void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
                      double density) {
   using C = PointColumns<Dim>;
   using N = NodeSums<Dim>;
+  constexpr int half = row_width<Lanes4>, gradient = N::gradient - half;  // it lies in the second half of a row
   double* sums = piece.nodes.sums.data();
   for (std::size_t node = 0; node < piece.nodes.box.size(); ++node)
     std::fill_n(sums + node * N::width + N::gradient, Dim, 0.0);
@@ -39,9 +40,9 @@ void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
       store(share, volume0 * (settings.normals.by_mass ? broadcast(density)
                                                        : determinant(load_deformation(piece.points, first))));
       for (int lane = 0; lane < count; ++lane) {
-        Lanes value{};
-        for (int d = 0; d < Dim; ++d) value[N::gradient + d] = share[lane];
-        scatter<N::gradient, Lanes, Dim>(stencil, lane, value, {}, sums);
+        Lanes4 value{};
+        for (int d = 0; d < Dim; ++d) value[gradient + d] = share[lane];
+        scatter<gradient, Lanes4, N::width, Dim>(stencil, lane, value, {}, sums + half);
       }
     });
   });

@@ -106,7 +106,8 @@ struct World {
   /// Points that left their patch go to the others.
   void migrate() {
     migration->begin();
-    for (auto& p : patches) migration->collect(p, lattice);
+    for (auto& patch : patches)
+      for (auto& piece : patch.pieces) migration->collect(patch, piece, lattice);
     migration->start();
     migration->finish(patches);
   }
@@ -128,13 +129,13 @@ struct World {
     sum();
   }
   void sum() {
-    for (bool beside_others : {true, false}) {
+    for (std::size_t p = 0; p < patches.size(); ++p) exchange->put(patches[p], p);
+    exchange->start();
+    for (bool beside_others : {false, true}) {
+      if (beside_others) exchange->receive();
       for (std::size_t p = 0; p < patches.size(); ++p)
-        if (exchange->beside_others(patches[p]) == beside_others) exchange->put(patches[p], p);
-      if (beside_others) exchange->start();
+        if (exchange->beside_others(patches[p]) == beside_others) exchange->add(patches[p], p);
     }
-    exchange->finish();
-    for (std::size_t p = 0; p < patches.size(); ++p) exchange->add(patches[p], p);
   }
 };
 

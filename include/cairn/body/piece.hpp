@@ -60,6 +60,7 @@ struct Piece {
   int body;
   Points<Dim> points;
   NodeBox<Dim> nodes;
+  bool projected = false;  // the nodes have the sums of the points as they are
 
   Piece(int body_, int states) : body(body_), points(states) {}
 };

@@ -47,8 +47,10 @@ class Points {
   std::vector<Image>& images() { return images_; }
   const std::vector<Image>& images() const { return images_; }
 
-  /// Brings columns [first, last) to the cache: there are too many short ones for the processor to foresee.
+  /// Brings columns [first, last) to the cache where they are too many short ones for the processor to foresee.
   void fetch(int first, int last) const {
+    constexpr int longest = 1000;  // measured: long columns are faster without
+    if (size_ > longest) return;
     for (int c = first; c < last; ++c) cairn::fetch(column(c), size_);
   }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <new>
+#include <utility>
 #include <vector>
 
 namespace cairn {
@@ -34,6 +35,24 @@ inline void fetch(const double* values, std::size_t n) {
   constexpr std::size_t line = 64 / sizeof(double);
   for (std::size_t i = 0; i < n; i += line) asm volatile("" ::"x"(values[i]));
 }
+
+/// Arrays whose contents are needed for a while only. Few serve many users one after the other, and stay in the cache.
+class ArrayPool {
+ public:
+  /// Gives `to` an array with any contents, if there is one and it has none.
+  void lend(AlignedDoubles& to) {
+    if (to.capacity() > 0 || free_.empty()) return;
+    to = std::move(free_.back());
+    free_.pop_back();
+  }
+  /// Leaves `from` empty.
+  void take_back(AlignedDoubles& from) {
+    if (from.capacity() > 0) free_.push_back(std::exchange(from, {}));
+  }
+
+ private:
+  std::vector<AlignedDoubles> free_;
+};
 
 /// Changes the size without room for more and without keeping the values.
 inline void resize_exactly(AlignedDoubles& values, std::size_t size) {

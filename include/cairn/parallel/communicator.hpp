@@ -78,30 +78,32 @@ class NeighbourExchange {
   NeighbourExchange(NeighbourExchange&&) = delete;
   NeighbourExchange& operator=(NeighbourExchange&&) = delete;
 
-  /// The message for a rank (a neighbour or this rank), emptied by `begin`.
+  /// The message for a rank: this one, emptied by `begin`, or a neighbour, emptied by `receive`.
   Message& outgoing(int rank) { return outgoing_[slot(rank)]; }
-  /// What the last `finish` received; it stays while the next messages are written.
+  /// The last message from a rank: this one, since `start`, or a neighbour, since `receive`. It stays while the next
+  /// ones are written.
   const Message& incoming(int rank) const { return incoming_[slot(rank)]; }
   const std::vector<int>& neighbours() const { return neighbours_; }
   int rank() const { return rank_; }
   Traffic& traffic() { return traffic_; }
 
-  /// Empties the outgoing messages (waiting for those still under way).
-  void begin();
-  /// Starts sending.
+  /// Empties the message to this rank.
+  void begin() { outgoing_.back().clear(); }
+  /// Starts sending. The message to this rank has arrived.
   void start();
-  /// Receives one message from each neighbour.
-  void finish();
+  /// Receives one message from each neighbour, and waits until its own are sent. Nothing where none is under way, and
+  /// false then.
+  bool receive();
 
  private:
   std::size_t slot(int rank) const;
-  void wait();
 
   MPI_Comm comm_;
   int rank_ = 0;
   std::vector<int> neighbours_;
   std::vector<Message> outgoing_, incoming_;  // by neighbour, and this rank's own at the end
   std::vector<MPI_Request> requests_;
+  bool under_way_ = false;
   Traffic traffic_;
 };
 

@@ -17,27 +17,28 @@ class Migration {
   /// \param owner  the rank of every patch; must outlive this object unchanged
   Migration(NeighbourExchange& messages, const std::vector<int>& owner) : messages_(messages), owner_(owner) {}
 
-  /// A migration: `begin`, `collect` for every patch that lies beside other ranks, `start`, `collect` for the rest
-  /// while the messages travel, `finish`.
+  /// A migration: `begin`, `collect` for every piece, `start`, `finish`.
   void begin();
   /// Takes out the points that left the patch. Pieces left without points stay as ghosts. A point that left the domain,
   /// is not finite or moved further than a neighbouring patch stays where it is and is reported by `failure`.
-  void collect(Patch<Dim>& patch, const Lattice<Dim>& lattice);
+  void collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice);
   void start() { messages_.start(); }
-  /// Receives those that arrived.
+  /// Receives those that arrived. Pieces that get points are no longer `projected`.
   void finish(std::vector<Patch<Dim>>& patches);
   /// What went wrong on this rank since `begin`; empty if nothing.
   const std::string& failure() const { return failure_; }
 
  private:
-  void collect_piece(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice);
-
   NeighbourExchange& messages_;
   const std::vector<int>& owner_;
   std::string failure_;
 };
 
-/// Sorts the points of a piece by cell, keeping the order within a cell.
+/// True where every point of the piece lies in its patch: what is found almost always, and fast.
+template <int Dim>
+bool all_inside(const Piece<Dim>& piece, const Lattice<Dim>& lattice, int patch);
+
+/// Sorts the points of a piece by cell, keeping the order within a cell. It is no longer `projected`.
 template <int Dim>
 void sort_by_cell(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Box<Dim>& cells);
 

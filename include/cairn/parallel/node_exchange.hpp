@@ -21,9 +21,9 @@ struct NodeQuantity {
   int width, used;
 };
 
-/// An exchange: `begin`, `put` for every patch that lies beside other ranks, `start`, `put` for the rest while the
-/// messages travel, `finish`, and `add` for every patch, which may come after the `begin` of the next exchange but
-/// before the same patch's `put`. Patches are named by their position among the rank's.
+/// An exchange: `begin`, `put` for every patch, `start`, `add` for every patch whose neighbours are all of this rank,
+/// while the messages travel, `receive`, `add` for the rest. `add` comes after the `begin` of the next exchange, if at
+/// all, and before the same patch's next `put`. Patches are named by their position among the rank's.
 template <int Dim>
 class NodeExchange {
  public:
@@ -40,8 +40,8 @@ class NodeExchange {
   /// For one more array (forces of a new stress, momenta projected again) over the same nodes, put in the same order.
   void begin(AlignedDoubles NodeBox<Dim>::*values);
   void put(Patch<Dim>& patch, std::size_t p);
-  void start() { messages_.start(); }
-  void finish();
+  void start();
+  void receive();
   void add(Patch<Dim>& patch, std::size_t p);
 
  private:

@@ -85,7 +85,12 @@ class Simulation {
   const std::vector<SolverMaterial>& materials() const { return materials_; }
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<Patch<Dim>>& patches() const { return patches_; }  // of this rank, ascending
-  std::vector<Patch<Dim>>& patches() { return patches_; }
+  /// Likewise; points may be changed until the next step.
+  std::vector<Patch<Dim>>& patches() {
+    for (auto& patch : patches_)
+      for (auto& piece : patch.pieces) piece.projected = false;
+    return patches_;
+  }
   const std::vector<int>& owner() const { return owner_; }
   MPI_Comm communicator() const { return comm_; }
   const StageTimers& timers() const { return timers_; }
@@ -108,7 +113,7 @@ class Simulation {
   // The stages of a step, in order. All but the first and the last are those of one patch, the p-th of this rank;
   // (*) begins with the sums over patches that the exchange before it brought.
   void choose_time_step(double longest);
-  void project_points(Patch<Dim>& patch);
+  void project_points(Patch<Dim>& patch);                        // of pieces that `finish_points` could not
   void contact_before_update(std::size_t p, Patch<Dim>& patch);  // (*)
   void strain_first(Patch<Dim>& patch, double share);
   void complete_forces(std::size_t p, Patch<Dim>& patch);  // (*)
@@ -124,17 +129,19 @@ class Simulation {
   void connect_patches();                                      // after patches came or went
   void balance();                                              // (*)
 
-  /// Calls f(position, patch) for every patch and notes the processor time that it takes.
-  /// Computes every patch: first those beside other ranks, after which `send` is called, so that messages travel while
-  /// the rest is computed.
-  template <class F, class Send>
-  void for_patches(F&& compute, Send&& send) {
-    for (const bool beside_others : {true, false}) {
+  /// Computes every patch: first those among patches of this rank, while the messages of the exchange before travel.
+  template <class F>
+  void for_patches(F&& compute) {
+    for (const bool beside_others : {false, true}) {
+      if (beside_others) {
+        const auto time = timers_.measure(Stage::exchange);
+        exchange_->receive();
+      }
       for (std::size_t p = 0; p < patches_.size(); ++p)
         if (beside_others_[p] == beside_others) compute(p, patches_[p]);
-      if (beside_others) send();
     }
   }
+  /// Notes the processor time that a patch takes.
   template <class F>
   void timed(std::size_t p, F&& f) {
     const bool empty = patches_[p].pieces.empty();
@@ -142,37 +149,32 @@ class Simulation {
     f(p, patches_[p]);
     if (!empty) patches_[p].seconds += processor_seconds() - start;
   }
-  /// Computes every patch, and exchanges what it shares with its neighbours.
+  /// Computes every patch, and sends what it shares with its neighbours.
   template <class F>
   void exchange_after(F&& compute) {
-    for_patches(
-        [&](std::size_t p, Patch<Dim>& patch) {
-          timed(p, compute);
-          const auto time = timers_.measure(Stage::exchange);
-          exchange_->put(patch, p);
-        },
-        [&] {
-          const auto time = timers_.measure(Stage::exchange);
-          exchange_->start();
-        });
+    for_patches([&](std::size_t p, Patch<Dim>& patch) {
+      timed(p, compute);
+      const auto time = timers_.measure(Stage::exchange);
+      exchange_->put(patch, p);
+    });
     const auto time = timers_.measure(Stage::exchange);
-    exchange_->finish();
+    exchange_->start();
   }
   /// Computes every patch for the last time in a step, and sends the points that left it.
   template <class F>
   void migrate_after(F&& compute) {
     migration_->begin();
-    for_patches(
-        [&](std::size_t p, Patch<Dim>& patch) {
-          timed(p, compute);
-          const auto time = timers_.measure(Stage::migrate);
-          migration_->collect(patch, lattice_);
-        },
-        [&] {
-          const auto time = timers_.measure(Stage::migrate);
-          migration_->start();
-        });
+    for_patches([&](std::size_t p, Patch<Dim>&) { timed(p, compute); });
+    const auto time = timers_.measure(Stage::migrate);
+    migration_->start();
   }
+  /// Then velocities and motions of nodes wait for an exchange; else they are lent to a patch while it is computed.
+  bool projects_again() const {
+    return solver_.stress_update == StressUpdate::both || solver_.stress_update == StressUpdate::modified_last;
+  }
+  void project_piece(Piece<Dim>& piece);
+  void project_ahead(Piece<Dim>& piece);
+  void finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share);
   void turn_stress(Piece<Dim>& piece);
   void move_rigid(Piece<Dim>& piece);
   bool turns_rigidly(const Piece<Dim>& piece) const {
@@ -205,6 +207,7 @@ class Simulation {
   std::unique_ptr<NeighbourExchange> messages_;
   std::unique_ptr<NodeExchange<Dim>> exchange_;
   std::unique_ptr<Migration<Dim>> migration_;
+  ArrayPool velocities_, motions_;  // of nodes, where nothing is projected again
   StageTimers timers_;
 
   double time_ = 0, dt_ = 0;

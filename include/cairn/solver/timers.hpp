@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <ctime>
+#include <utility>
 
 namespace cairn {
 
@@ -20,23 +21,35 @@ inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::count)>
 
 class StageTimers {
  public:
-  /// Adds the time until it goes out of scope to a stage.
+  /// Adds the time until it goes out of scope to a stage. Scopes may nest: time counts for the innermost.
   class Scope {
    public:
-    Scope(double& seconds) : seconds_(seconds), start_(std::chrono::steady_clock::now()) {}
-    ~Scope() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    Scope(StageTimers& timers, Stage stage) : timers_(timers), outer_(timers.enter(stage)) {}
+    ~Scope() { timers_.enter(outer_); }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
 
    private:
-    double& seconds_;
-    std::chrono::steady_clock::time_point start_;
+    StageTimers& timers_;
+    Stage outer_;
   };
-  Scope measure(Stage stage) { return Scope(seconds_[static_cast<std::size_t>(stage)]); }
+  Scope measure(Stage stage) { return Scope(*this, stage); }
   double seconds(Stage stage) const { return seconds_[static_cast<std::size_t>(stage)]; }
 
  private:
-  std::array<double, static_cast<std::size_t>(Stage::count)> seconds_{};
+  using Clock = std::chrono::steady_clock;
+
+  /// Time counts for `stage` from now on (`count`: for none); returns what it counted for.
+  Stage enter(Stage stage) {
+    const auto now = Clock::now();
+    seconds_[static_cast<std::size_t>(stage_)] += std::chrono::duration<double>(now - since_).count();
+    since_ = now;
+    return std::exchange(stage_, stage);
+  }
+
+  std::array<double, static_cast<std::size_t>(Stage::count) + 1> seconds_{};
+  Stage stage_ = Stage::count;
+  Clock::time_point since_{};
 };
 
 }  // namespace cairn
