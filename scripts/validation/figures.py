@@ -10,7 +10,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
 
 
 @dataclasses.dataclass
@@ -28,7 +28,8 @@ class Panel:
     x_label: str
     y_label: str
     curves: list[Curve]
-    logarithmic: bool = False
+    logarithmic: bool = False  # both axes; cell sizes along x
+    log_from: float = 0.0  # above 0: a logarithmic axis for y that begins here
 
 
 def save(figure, path: Path) -> Path:
@@ -39,12 +40,13 @@ def save(figure, path: Path) -> Path:
 
 
 def draw_panels(path: Path, title: str, panels: list[Panel], columns: int = 3) -> Path:
-    """All panels in rows of `columns`, in one picture."""
+    """All panels in rows of `columns`, in one picture. A legend that the panel before has as well is left out."""
     columns = min(columns, len(panels))
     rows = -(-len(panels) // columns)
     figure, grid = plt.subplots(rows, columns, figsize=(4.6 * columns, 3.6 * rows), squeeze=False)
     for axes in grid.flat[len(panels):]:
         axes.set_axis_off()
+    labels: list[str] = []
     for axes, panel in zip(grid.flat, panels):
         for curve in panel.curves:
             colour = {"color": curve.colour} if curve.colour else {}
@@ -55,11 +57,19 @@ def draw_panels(path: Path, title: str, panels: list[Panel], columns: int = 3) -
             sizes = sorted({float(size) for curve in panel.curves for size in curve.x})
             axes.set_xticks(sizes, [f"1/{round(1 / size)}" for size in sizes])
             axes.xaxis.set_minor_locator(NullLocator())
+            axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axes.yaxis.set_minor_locator(NullLocator())
+        if panel.log_from > 0:
+            axes.set_yscale("log")
+            axes.set_ylim(bottom=panel.log_from)
         axes.set_title(panel.title, fontsize=9)
         axes.set_xlabel(panel.x_label)
         axes.set_ylabel(panel.y_label)
-        axes.legend(fontsize=7)
         axes.grid(alpha=0.3)
+        labels, before = [curve.label for curve in panel.curves], labels
+        if labels != before:
+            axes.legend(fontsize=7)
     figure.suptitle(title, fontsize=11)
     figure.tight_layout()
     return save(figure, path)

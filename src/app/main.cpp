@@ -30,7 +30,10 @@ Override parse_override(const std::string& text) {
 
 /// Adds --set; parse_override serves its values.
 void add_sets(CLI::App* command, Arguments& a) {
-  command->add_option("--set", a.sets, "KEY=VALUE: override a key by its dotted path; VALUE is TOML; may be repeated")
+  command
+      ->add_option(
+          "--set", a.sets,
+          "KEY=VALUE: override a key by its dotted path; VALUE is TOML, a word needs no quotes; may be repeated")
       ->allow_extra_args(false);
 }
 

@@ -51,17 +51,30 @@ toml::node* descend(toml::node& node, const std::string& part, const Location& w
   return nullptr;
 }
 
+/// True for a name or a path, which a value on the command line may be without quotes: letters, digits and _ - . / with
+/// a letter before any digit, so that no number that was written wrongly is taken for one.
+bool is_word(std::string_view text) {
+  constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", marks = "_-./";
+  const std::string known = fmt::format("{}{}0123456789", letters, marks);
+  const std::size_t first = text.find_first_not_of(marks);
+  return text.find_first_not_of(known) == text.npos && first != text.npos && letters.find(text[first]) != text.npos;
+}
+
+/// A table of one `value`; an empty one where the text is no value.
+toml::table parse_value(const std::string& text, const std::string& source) {
+  try {
+    return toml::parse("value = " + text, source);
+  } catch (const toml::parse_error&) {
+    return is_word(text) ? toml::parse(fmt::format("value = \"{}\"", text), source) : toml::table{};
+  }
+}
+
 void apply(toml::table& root, const Override& change, Errors& errors) {
   const Location where{"--set " + printable(change.key), 0};
   const auto parts = split_key(change.key);
   for (const auto& part : parts)
     if (part.empty()) return errors.add(where, "", "not a key; write --set table.key=VALUE");
-  toml::table parsed;
-  try {
-    parsed = toml::parse("value = " + change.value, where.file);
-  } catch (const toml::parse_error&) {
-    parsed.clear();
-  }
+  toml::table parsed = parse_value(change.value, where.file);
   if (parsed.size() != 1 || !parsed.get("value"))
     return errors.add(where, "",
                       fmt::format("{} is not a TOML value; strings need quotes: --set '{}=\"text\"'",

@@ -68,7 +68,9 @@ CsvWriter::CsvWriter(std::filesystem::path file, std::vector<std::string> column
 }
 
 CsvWriter::~CsvWriter() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+  if (descriptor_ < 0) return;
+  ::fsync(descriptor_);
+  ::close(descriptor_);
 }
 
 CsvWriter::CsvWriter(CsvWriter&& other) noexcept

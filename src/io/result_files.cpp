@@ -72,6 +72,23 @@ void remove_leftovers(const fs::path& folder) {
   for (const auto& file : found) fs::remove(file, error);
 }
 
+UnflushedFiles::~UnflushedFiles() {
+  try {
+    flush();
+  } catch (const std::exception&) {  // no memory: what is being reported already matters more
+  }
+}
+
+std::string UnflushedFiles::flush() {
+  std::string first;
+  for (const auto& file : files_) {
+    const std::string error = flush_to_disk(file);
+    if (first.empty()) first = error;
+  }
+  files_.clear();
+  return first;
+}
+
 std::string replace_file(const fs::path& file, const std::string& text) {
   const fs::path temporary = temporary_name(file);
   errno = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <exception>
 #include <limits>
+#include <numeric>
 
 #include "cairn/core/error.hpp"
 
@@ -27,6 +28,19 @@ bool wait_or_leave(std::span<MPI_Request> requests) {
   for (const double start = MPI_Wtime(); !done && !(failing && MPI_Wtime() - start > patience);)
     MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
   return done != 0;
+}
+
+std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm) {
+  int rank = 0, ranks = 1;
+  MPI_Comm_rank(comm, &rank);
+  MPI_Comm_size(comm, &ranks);
+  std::vector<int> counts(ranks), starts(ranks, 0);
+  const int count = static_cast<int>(mine.size());
+  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
+  std::partial_sum(counts.begin(), counts.end() - 1, starts.begin() + 1);
+  std::vector<double> all(rank == 0 ? starts.back() + counts.back() : 0);
+  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm);
+  return all;
 }
 
 void MaximumReduction::start(std::span<const double> mine, MPI_Comm comm) {

@@ -42,8 +42,7 @@ void HistoryTables<Dim>::open(const RunState* from) {
 }
 
 template <int Dim>
-void HistoryTables<Dim>::note_positions(RunState& state) {
-  history_.flush(), bodies_.flush();
+void HistoryTables<Dim>::note_positions(RunState& state) const {
   state.history_file = history_.position();
   if (bodies_.position().bytes > 0) state.bodies_file = bodies_.position();
 }
@@ -66,10 +65,6 @@ template <int Dim>
 void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
   // Tracked bodies are few: each rank sends those it answers for to rank 0.
   constexpr int width = 13;
-  const MPI_Comm comm = simulation.communicator();
-  int rank = 0, ranks = 1;
-  MPI_Comm_rank(comm, &rank);
-  MPI_Comm_size(comm, &ranks);
   std::vector<double> mine;
   for (const BodyState& s : body_states(simulation))
     if (std::find(track_.begin(), track_.end(), s.body) != track_.end()) {
@@ -77,12 +72,7 @@ void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
       for (const Vec3& v : {s.centre, s.velocity, s.angular_velocity, s.angular_momentum})
         mine.insert(mine.end(), v.data(), v.data() + 3);
     }
-  std::vector<int> counts(ranks), starts(ranks, 0);
-  const int count = static_cast<int>(mine.size());
-  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
-  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<double> all(rank == 0 ? starts.back() + counts.back() : 0);
-  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm);
+  const std::vector<double> all = gather_on_first(mine, simulation.communicator());
   for (std::size_t i = 0; i < all.size(); i += width) {
     std::vector<CsvValue> row = {simulation.steps(), simulation.time(), static_cast<std::int64_t>(all[i])};
     for (int group = 0; group < 4; ++group)

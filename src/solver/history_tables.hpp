@@ -25,8 +25,10 @@ class HistoryTables {
   /// Adds one row to history.csv and one for each tracked body to bodies.csv. Collective.
   void add(const Simulation<Dim>& simulation, const Totals& totals, double energy_error);
 
-  /// Has the files flushed to disk, and notes how far they go.
-  void note_positions(RunState& state);
+  /// Has the files flushed to disk.
+  void flush() { history_.flush(), bodies_.flush(); }
+  /// Notes how far the files go.
+  void note_positions(RunState& state) const;
   /// The first error, empty if there was none.
   const std::string& error() const { return history_.error().empty() ? bodies_.error() : history_.error(); }
 

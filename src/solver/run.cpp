@@ -71,7 +71,6 @@ class Run {
     const double step_wall = wall_clock() - stepping - output_wall;
     write_outputs(true, wall_before_ + wall_clock() - start_);
     flush_results();
-    throw_together(comm_, tables_.error());
     display.finish();
     report(step_wall);
     return done;
@@ -103,10 +102,9 @@ class Run {
 
   /// Leaves the points as they are now in a file of their own.
   [[noreturn]] void fail(const std::string& reason) {
-    const fs::path file = settings_.out / failure_file;
     std::string text = fmt::format("the state then is in {} in the folder of the results", failure_file);
     try {
-      write_particles(simulation_, file, case_.output.particles.fields);
+      write_particles(simulation_, next_result(failure_file), case_.output.particles.fields);
     } catch (const RunError& error) {
       text = fmt::format("the state then is lost: {}", error.what());
     }
@@ -169,19 +167,17 @@ class Run {
 
   /// The path of a result file that is to be written.
   fs::path next_result(const std::string& name) {
-    unflushed_.push_back(settings_.out / name);
-    return unflushed_.back();
+    fs::path file = settings_.out / name;
+    if (rank_ == 0) unflushed_.add(file);
+    return file;
   }
 
-  /// Has the disk hold the files of points, grains and contacts. Until then they may still be in the system's memory:
-  /// waiting for the disk after each would cost several times the writing.
+  /// Has the disk hold all results. Until then they may still be in the system's memory: waiting for the disk after
+  /// each file would cost several times the writing.
   void flush_results() {
-    std::string error;
-    if (rank_ == 0)
-      for (const auto& file : unflushed_)
-        if (error.empty()) error = flush_to_disk(file);
-    unflushed_.clear();
-    throw_together(comm_, error);
+    throw_together(comm_, unflushed_.flush());
+    tables_.flush();
+    throw_together(comm_, tables_.error());
   }
 
   void write_history() {
@@ -201,11 +197,9 @@ class Run {
   /// leaves the count alone, so that the files that follow have the numbers of a run that was not stopped.
   void write_checkpoint_file(bool scheduled) {
     flush_results();  // what comes before a checkpoint is not written again
-    throw_together(comm_, tables_.error());
     RunState state;
     state.step = simulation_.step_state();
-    if (rank_ == 0) tables_.note_positions(state);
-    throw_together(comm_, tables_.error());
+    tables_.note_positions(state);
     share_rank_zero(state);
     state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
     state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
@@ -308,7 +302,7 @@ class Run {
   bool needs_wall_ = false;      // an output depends on wall time
   double contacts_cleared_ = 0;  // [s]
   fs::path last_checkpoint_;
-  std::vector<fs::path> unflushed_;
+  UnflushedFiles unflushed_;       // of rank 0
   std::int64_t steps_before_ = 0;  // of the run, before this process
   double fraction_before_ = 0, wall_before_ = 0;
 };

@@ -66,12 +66,7 @@ Totals Simulation<Dim>::totals() const {
     mine.push_back(patch.id);
     mine.insert(mine.end(), sums.begin(), sums.end());
   }
-  std::vector<int> counts(ranks_), starts(ranks_, 0);
-  const int count = static_cast<int>(mine.size());
-  MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm_);
-  for (int r = 1; r < ranks_; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<double> all(rank_ == 0 ? starts.back() + counts.back() : 0);
-  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm_);
+  const std::vector<double> all = gather_on_first(mine, comm_);
   std::map<int, const double*> by_patch;
   for (std::size_t i = 0; i < all.size(); i += 1 + sum_count) by_patch[static_cast<int>(all[i])] = &all[i + 1];
   Sums sums{};

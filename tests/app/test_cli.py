@@ -90,14 +90,14 @@ def test_set_forms(cairn: Program, here: Path):
     """Dotted keys, entries of arrays, inline tables; a later one wins over an earlier one."""
     values = {"time.steps": 3, "output.history": "{ every = 1 }", "bodies.1.velocity": "[0.0, 0.5]",
               "contact": '{ law = "frictionless", pair = [{ materials = ["soft", "soft"], friction = 0.5 }] }',
-              "contact.fill": 0.25, "parallel.partition": '"round_robin"', "title": '"a = b"'}
+              "contact.fill": 0.25, "parallel.partition": "round_robin", "solver.shape": '"linear"', "title": '"a = b"'}
     done = cairn("run", DISKS, "--out", "out", *sets(values), "--set=time.steps=4", cwd=here)
     expect_code(done, 0)
     expect(" steps=4 " in done.last, done.last)
     expect(len((here / "out" / "history.csv").read_text().splitlines()) == 6, "not one row for each step")
     resolved = (here / "out" / "case.toml").read_text()
     for text in ('title = "a = b"', "steps = 4", "velocity = [0.0, 0.5]", 'law = "frictionless"', "fill = 0.25",
-                 "friction = 0.5", 'partition = "round_robin"', "history = { every = 1 }"):
+                 "friction = 0.5", 'partition = "round_robin"', 'shape = "linear"', "history = { every = 1 }"):
         expect(text in resolved, f"'{text}' is not in the resolved case:\n{resolved}")
 
 

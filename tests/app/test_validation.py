@@ -122,10 +122,10 @@ def drifts(scratch: Path):
     (scratch / "log.txt").write_text(
         "Note: nothing\n2-D neo_hookean  strain 0.0001: det F 9e-12, pressure 3e-07, deviator 1e-09, det 2e-08\n"
         "2-D neo_hookean  (plane stress) strain 0.03: det F 1e-2, pressure 5e-10, deviator 2e-11, det 1e-14\n")
-    volume, stress = rotation.check_point(scratch)
+    volume, stress = rotation.check_tool(rotation.POINT, scratch)
     assert volume.value == 1e-2 and not volume.passed and stress.value == 3e-7 and stress.passed
     (scratch / "log.txt").write_text("")
-    assert not rotation.check_point(scratch)[0].passed
+    assert not rotation.check_tool(rotation.POINT, scratch)[0].passed
 
 
 def validate(*arguments) -> subprocess.CompletedProcess:

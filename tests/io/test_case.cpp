@@ -221,11 +221,27 @@ TEST_F(CaseFile, OverridesAreApplied) {
   EXPECT_EQ(c.title, "b");
 }
 
+TEST_F(CaseFile, WordsOfOverridesNeedNoQuotes) {
+  const Case c = read(base, {{"solver.shape", "linear"}, {"time.cfl", "0.25"}, {"title", "runs/number_5.a"}});
+  EXPECT_EQ(c.solver.shape, ShapeFunction::linear);
+  EXPECT_EQ(c.time.cfl, 0.25);
+  EXPECT_EQ(c.title, "runs/number_5.a");
+  EXPECT_EQ(read(base, {{"title", "../a"}}).title, "../a");
+  // What is a value keeps its type; what is a number written wrongly is no word.
+  expect_error(base, "--set title: is true or false", "string", {{"title", "true"}});
+  expect_error(base, "--set title: is a number", "string", {{"title", "inf"}});
+  expect_error(base, "--set title: is an integer", "string", {{"title", "12"}});
+  expect_error(base, "--set contact.friction: is a string", "at least 0", {{"contact.friction", "half"}});
+  for (const std::string text : {"0.5x", ".5", "-.5", "1,5", "", "..", "two words", "a\"b", "a\nb = 1", "[a]"})
+    expect_error(base, "--set contact.friction: ", "is not a TOML value; strings need quotes",
+                 {{"contact.friction", text}});
+}
+
 TEST_F(CaseFile, ErrorsOfOverridesNameThem) {
   expect_error(base, "--set time.end: -1 is out of range", "greater than 0", {{"time.end", "-1"}});
   expect_error(base, "--set bodies.0.velocity: has 3 entries", "2 numbers", {{"bodies.0.velocity", "[1, 2, 3]"}});
   expect_error(base, "--set bodies.1.velocity: '1' is not an entry", "1 entries", {{"bodies.1.velocity", "[1, 2]"}});
-  expect_error(base, "--set contact.law: \"stick\" is not a TOML value", "quotes", {{"contact.law", "stick"}});
+  expect_error(base, "--set contact.law: \"no slip\" is not a TOML value", "quotes", {{"contact.law", "no slip"}});
   expect_error(base, "--set contact.lw: unknown key", "'law'", {{"contact.lw", "\"stick\""}});
   expect_error(base, "--set time.end.x: 'x' is inside a plain value", "tables", {{"time.end.x", "1"}});
 }

@@ -21,6 +21,15 @@ struct MaterialPoint {
     return modulus;
   }
 
+  /// The same in plane strain, and with a J that is not that of F: 1 for closed forms of small strains.
+  double advance_at(const Mat3& A, double J) {
+    const auto F_now = advance_deformation(tensor<Dim>(A), tensor<Dim>(F));
+    auto s = symmetric<Dim>(stress);
+    const double modulus = law.update(tensor<Dim>(A), F_now, J, s, state);
+    F = matrix(F_now), stress = matrix(s);
+    return modulus;
+  }
+
   double strain_energy() const { return law.strain_energy(tensor<Dim>(F), state); }
 };
 

@@ -100,4 +100,20 @@ NodeBody<Dim> random_body(Random& random) {
   return body;
 }
 
+/// A law that asks for no volume at the node.
+inline ContactOptions options_of(ContactLaw law, Release release = Release::reaction, double mu = 0.3) {
+  ContactOptions options;
+  options.law = law, options.release = release, options.friction = mu;
+  options.fill = 0;
+  return options;
+}
+
+/// Two bodies of mass 1 and 3 at the node: body 0 on the left comes to the right and rubs upwards.
+inline std::vector<NodeBody<2>> meeting_pair() {
+  NodeBody<2> left, right;
+  left.mass = 1, left.momentum = Vec<2>(4, 2), left.gradient = Vec<2>(2, 0);
+  right.mass = 3, right.momentum = Vec<2>(0, 0), right.gradient = Vec<2>(-1, 0);
+  return {left, right};
+}
+
 }  // namespace cairn::test

@@ -41,6 +41,7 @@ class CsvWriter {
   CsvWriter(std::filesystem::path file, std::vector<std::string> columns);
   /// Goes on with `file` at `from`: what lies behind is cut off.
   CsvWriter(std::filesystem::path file, std::vector<std::string> columns, const CsvPosition& from);
+  /// Leaves all rows on the disk.
   ~CsvWriter();
   CsvWriter(CsvWriter&& other) noexcept;
   CsvWriter& operator=(CsvWriter&& other) noexcept;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace cairn {
@@ -36,6 +37,23 @@ void remove_leftovers(const std::filesystem::path& folder);
 
 /// Has the system put a file and its name on the disk; returns the error, empty if none. Not collective.
 std::string flush_to_disk(const std::filesystem::path& file);
+
+/// Files that may still be in the system's memory. They are flushed to disk at the latest when the object goes out of
+/// scope, so that a run that fails leaves them there, too. Not collective.
+class UnflushedFiles {
+ public:
+  UnflushedFiles() = default;
+  UnflushedFiles(const UnflushedFiles&) = delete;
+  UnflushedFiles& operator=(const UnflushedFiles&) = delete;
+  ~UnflushedFiles();
+
+  void add(std::filesystem::path file) { files_.push_back(std::move(file)); }
+  /// Flushes all of them and forgets them; returns the first error, empty if there was none.
+  std::string flush();
+
+ private:
+  std::vector<std::filesystem::path> files_;
+};
 
 /// Gives a file this text, all of it or none: it is written under a temporary name, flushed to disk and renamed.
 /// Returns the error, empty if none. Not collective.

@@ -42,6 +42,9 @@ struct Traffic {
 /// end.
 bool wait_or_leave(std::span<MPI_Request> requests);
 
+/// The numbers of all ranks one after the other, in the order of the ranks, on rank 0; none elsewhere. Collective.
+std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm);
+
 /// The largest of each of a few numbers over all ranks, found while other work is done.
 class MaximumReduction {
  public:

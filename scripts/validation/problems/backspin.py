@@ -1,4 +1,8 @@
-"""A spinning sphere is set down on a plane, against a rigid sphere: it slips, then rolls."""
+"""A spinning sphere is set down on a plane, against a rigid sphere: it slips, then rolls.
+
+It lands late, is too fast then and too slow later, so that x at one time may be right by chance: whether smaller
+cells are better is asked of the error over the whole way.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ from validation.closed_forms import Backspin
 from validation.figures import Curve, Panel, draw_panels
 from validation.problems.rolling import travelled
 from validation.runs import Run
-from validation.series import mean, motion
+from validation.series import Table, mean, motion
 from validation.suite import Folders, Problem
 
 RADIUS, END, SETTLED = 1.0, 1.0, 0.6  # [m], [s], from when on the velocity is averaged [s]
@@ -38,6 +42,12 @@ def runs(full: bool) -> dict[str, Run]:
     return {label(cells, gap): run(cells, gap) for cells in CELLS for gap in (GAPS if full else GAPS[:1])}
 
 
+def path_error(path: Table) -> float:
+    """Root of the mean square error of x over time [m]."""
+    error = path["x"] - path["x"][0] - Backspin().distance(path["time"])
+    return float(np.sqrt(np.trapz(error**2, path["time"]) / (path["time"][-1] - path["time"][0])))
+
+
 def checks(folders: Folders) -> list[Check]:
     exact, found = Backspin(), []
     for gap in GAPS:
@@ -53,9 +63,10 @@ def checks(folders: Folders) -> list[Check]:
                 record(name, *row) for row in rows]
             found.append(record(name, "mean spin, 0.6 to 1 s [rad/s]", -mean(path, "wz", SETTLED, END),
                                 float(exact.spin_at(END))))
-            errors.append(abs(found[-3].error))
+            errors.append(path_error(path))
+            found.append(record(name, "root mean square error of x, 0 to 1 s [m]", errors[-1]))
         if gap == "h/2" and len(errors) == 2:
-            found.append(holds("gap h/2", "x at 1 s better at R/8 than at R/4", errors[1] < errors[0]))
+            found.append(holds("gap h/2", "x over 0 to 1 s better at R/8 than at R/4", errors[1] < errors[0]))
     return found
 
 

@@ -71,7 +71,7 @@ def checks(folders: Folders) -> list[Check]:
 
 
 def draw(folders: Folders, out: Path) -> list[Path]:
-    times = np.linspace(0, END, 100)
+    times = np.linspace(0, END, 1001)
     panels = []
     for kind, (values, shifts) in KINDS.items():
         angle, friction, speed = (*values, 0.0)[:3]
@@ -79,10 +79,13 @@ def draw(folders: Folders, out: Path) -> list[Path]:
         rigid = np.maximum(speed + pull * times, 0) if pull < 0 else pull * times
         way = np.concatenate(([0.0], np.cumsum((rigid[1:] + rigid[:-1]) / 2 * np.diff(times))))
         paths = {shift: motion(folders[name], 1) for shift in shifts if (name := label(kind, shift)) in folders}
-        panels.append(Panel(kind, "time [s]", "x [m]", [Curve("rigid", times, way, "k--")] + [
-            Curve(f"shift {shift}", path["time"], path["x"] - path["x"][0]) for shift, path in paths.items()]))
-        panels.append(Panel(kind, "time [s]", "velocity [m/s]", [Curve("rigid", times, rigid, "k--")] + [
-            Curve(f"shift {shift}", path["time"], path["vx"]) for shift, path in paths.items()]))
+        if way[-1] > 0:
+            panels.append(Panel(kind, "time [s]", "x [m]", [Curve("rigid", times, way, "k--")] + [
+                Curve(f"shift {shift}", path["time"], path["x"] - path["x"][0]) for shift, path in paths.items()]))
+        panels.append(Panel(kind, "time [s]", "x less that of the rigid block [mm]", [
+            Curve("rigid", times, 0 * times, "k--")] + [Curve(
+                f"shift {shift}", path["time"], 1e3 * (path["x"] - path["x"][0] - np.interp(path["time"], times, way)))
+                for shift, path in paths.items()]))
     return [draw_panels(out / "block.png", "Block on an incline", panels, 4)]
 
 

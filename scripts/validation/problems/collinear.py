@@ -81,7 +81,7 @@ def draw(folders: Folders, out: Path) -> list[Path]:
         curves = [Curve(f"disk {k + 1}", seen.times / fronts.transit_time(),
                         fronts.pressure_along((1, 0))(seen.stress[:, k]) / fronts.impact_stress()) for k in range(4)]
         panels.append(Panel(case, "time [transit times]", "pressure at the centre / (rho c v)", curves))
-    return pictures + [draw_panels(out / "collinear_pressure.png", "Four collinear disks", panels)]
+    return pictures + [draw_panels(out / "collinear_pressure.png", "Four collinear disks", panels, 4)]
 
 
 PROBLEM = Problem("collinear", "Stress wave in four collinear disks", "Bardenhagen et al. 2001, section 3.3, Fig. 9",
