@@ -96,7 +96,7 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const Lattice<Dim>
   for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
     const auto& piece = patch.pieces[k];
     const Body& body = bodies[piece.body];
-    const bool turns = body.rigid && body.angular_velocity != Vec3::Zero();
+    const bool turns = settings.chords && body.rigid && body.angular_velocity != Vec3::Zero();
     if (turns) turning_.push_back(body);
     int node = 0;
     for_each_row(piece.nodes.box, box_, [&](int row, int n) {

@@ -236,6 +236,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   for (int f = 0; f < 2 * Dim; ++f) types[f] = faces_[f].type;
   contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, types);
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
+  contact_.chords = c.solver.stress_update == StressUpdate::both;
   bodies_ = make_bodies(c, materials_);
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
   for (int d = 0; d < Dim; ++d)

@@ -33,6 +33,9 @@ struct ContactSettings {
   std::vector<PairLaw> pairs;  // materials x materials, then one row for walls
   std::array<FaceType, 6> faces{};
   bool keep_contacts = false;  // sum what passes between pairs, for output
+  // Rigid bodies turn along chords (contact/course.hpp), not tangents. Chords strain what sticks to them by t^2/2 in
+  // and out: for steps that take the strain at their start and at their end, as "both" does, so that the two cancel.
+  bool chords = true;
 
   static ContactSettings make(const ContactOptions& options, std::vector<ContactMaterial> materials,
                               const std::array<FaceType, 6>& faces);
