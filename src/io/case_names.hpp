@@ -30,6 +30,7 @@ inline constexpr Named<Passes> passes_names[] = {
     {"both", Passes::both}, {"before", Passes::before}, {"after", Passes::after}};
 inline constexpr Named<FaceType> face_type_names[] = {
     {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
+inline constexpr Named<Surface> surface_names[] = {{"whole", Surface::whole}, {"cut", Surface::cut}};
 inline constexpr Named<Plane> plane_names[] = {{"strain", Plane::strain}, {"stress", Plane::stress}};
 inline constexpr Named<Partition> partition_names[] = {{"metis", Partition::metis},
                                                        {"round_robin", Partition::round_robin}};

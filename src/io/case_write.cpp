@@ -131,6 +131,7 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   out.key("flip", solver.flip);
   out.key("spin", solver.spin);
   out.key("points_per_cell", solver.points_per_cell);
+  out.key("surface", name_of(surface_names, solver.surface));
   out.key("energy_limit", solver.energy_limit);
 }
 

@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include <numeric>
+#include <optional>
 #include <set>
 
+#include "cairn/body/cut_sites.hpp"
 #include "cairn/core/error.hpp"
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/solver/checkpoint.hpp"
@@ -104,7 +106,8 @@ class Filler {
     for (int b = 0; b < static_cast<int>(c.bodies.size()); ++b) list_images(b);
   }
 
-  /// Calls f(body, position, image shift) for every point of the patch: by body, then by cell, then within the cell.
+  /// Calls f(body, position, share of a whole point's volume, image shift) for every point of the patch: by body, then
+  /// by cell, then within the cell.
   template <class F>
   void for_points(int patch, F&& f) const {
     for (const auto& placed : bodies_of_[patch]) {
@@ -112,12 +115,19 @@ class Filler {
       const Box<Dim> cells = intersection(placed.cells, lattice_.patch_cells(patch));
       Box<Dim> inside;
       inside.upper.fill(per_direction_);
+      std::optional<CutSites<Dim>> cut;
+      if (case_.solver.surface == Surface::cut && is_round(shape)) cut.emplace(cut_sites(shape, placed.shift, cells));
       for_each(cells, [&](const Index<Dim>& cell) {
         for_each(inside, [&](const Index<Dim>& sub) {
+          if (cut) {
+            const PointSite site = cut->at(site_of(cell, sub));
+            if (site.share > 0) f(placed.body, site.position + placed.shift, site.share, placed.shift);
+            return;
+          }
           Vec3 x = Vec3::Zero();
           for (int d = 0; d < Dim; ++d)
             x[d] = lattice_.lower()[d] + (cell[d] + (sub[d] + 0.5) / per_direction_) * lattice_.spacing()[d];
-          if (contains(shape, x - placed.shift)) f(placed.body, x, placed.shift);
+          if (contains(shape, x - placed.shift)) f(placed.body, x, 1.0, placed.shift);
         });
       });
     }
@@ -128,7 +138,7 @@ class Filler {
     const double volume = lattice_.cell_volume() / std::pow(per_direction_, Dim);
     int filled = -1;  // points come body by body
     InitialState initial;
-    for_points(patch.id, [&](int b, const Vec3& x, const Vec3& shift) {
+    for_points(patch.id, [&](int b, const Vec3& x, double share, const Vec3& shift) {
       const Body& body = bodies_[b];
       const auto& spec = case_.bodies[b];
       auto& points = patch.piece_of(b, static_cast<int>(materials_[body.material].state_names.size())).points;
@@ -151,7 +161,7 @@ class Filler {
         points.column(C::velocity + d)[p] = v[d];
         image[d] = static_cast<std::int16_t>(-std::lround(shift[d] / lattice_.length(d)));
       }
-      points.column(C::volume)[p] = volume / initial.volume_ratio;
+      points.column(C::volume)[p] = share * volume / initial.volume_ratio;
       points.ids()[p] = first_id++;
       points.images()[p] = image;
     });
@@ -164,6 +174,18 @@ class Filler {
     Vec3 shift;      // of the image that reaches here
     Box<Dim> cells;  // that its bounds touch
   };
+
+  Index<Dim> site_of(const Index<Dim>& cell, const Index<Dim>& sub) const {
+    Index<Dim> site;
+    for (int d = 0; d < Dim; ++d) site[d] = cell[d] * per_direction_ + sub[d];
+    return site;
+  }
+
+  CutSites<Dim> cut_sites(const Shape& shape, const Vec3& shift, const Box<Dim>& cells) const {
+    Vec3 origin = -shift, spacing = Vec3::Zero();
+    for (int d = 0; d < Dim; ++d) origin[d] += lattice_.lower()[d], spacing[d] = lattice_.spacing()[d] / per_direction_;
+    return {shape, origin, spacing, {site_of(cells.lower, {}), site_of(cells.upper, {})}};
+  }
 
   /// Lists the patches that a body and its periodic images touch.
   void list_images(int b) {
@@ -280,7 +302,7 @@ void Simulation<Dim>::place_points(const Case& c) {
   const Filler<Dim> filler(c, lattice_, bodies_, materials_);
   std::vector<std::int64_t> count(lattice_.patch_count(), 0), of_body(bodies_.size(), 0);
   for (int patch = rank_; patch < lattice_.patch_count(); patch += ranks_)
-    filler.for_points(patch, [&](int body, const Vec3&, const Vec3&) { ++count[patch], ++of_body[body]; });
+    filler.for_points(patch, [&](int body, const Vec3&, double, const Vec3&) { ++count[patch], ++of_body[body]; });
   MPI_Allreduce(MPI_IN_PLACE, count.data(), static_cast<int>(count.size()), MPI_INT64_T, MPI_SUM, comm_);
   check_bodies(c, of_body, comm_);
   make_patches(count);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "../support/cases.hpp"
 #include "../support/mpi_environment.hpp"
 #include "cairn/solver/body_states.hpp"
@@ -39,6 +42,28 @@ TEST(BodyStates, MotionOfASphereAndABlock) {
 TEST(BodyStates, MotionAcrossPeriodicBoundaries) {
   check_motion<2>(Ball{Vec3(0.97, 0.06, 0), 0.23}, true);
   check_motion<3>(Ball{Vec3(0.06, 0.97, 0.51), 0.23}, true);
+}
+
+/// Mass and centre of a ball whose surface is cut, over several patches and across the boundary.
+template <int Dim>
+void check_cut(const Vec3& at) {
+  Case c = soft_case(Dim, Dim == 2 ? 24 : 12, 4);
+  c.domain.periodic = {true, true, false};
+  c.solver.surface = Surface::cut;
+  const double radius = 0.23;
+  add_body(c, Ball{at, radius}, Vec3::Zero(), Vec3::Zero());
+  Simulation<Dim> simulation(c, MPI_COMM_WORLD);
+  const BodyState s = body_states(simulation).at(0);
+  const double volume =
+      Dim == 2 ? std::numbers::pi * radius * radius : 4 / 3.0 * std::numbers::pi * std::pow(radius, 3);
+  EXPECT_NEAR(s.mass / (c.materials[0].density * volume), 1, 2e-3);
+  EXPECT_LE((s.centre - at).norm(), 2e-4);
+}
+TEST(BodyStates, CutSurfacesKeepMassAndCentre) {
+  check_cut<2>(Vec3(0.47, 0.53, 0));
+  check_cut<2>(Vec3(0.97, 0.06, 0));
+  check_cut<3>(Vec3(0.47, 0.53, 0.51));
+  check_cut<3>(Vec3(0.06, 0.97, 0.51));
 }
 
 }  // namespace

@@ -17,6 +17,8 @@ enum class DepartingFriction { none, coulomb, printed };
 enum class Passes { both, before, after };
 /// What holds across the plane of a 2D case: no strain, or no stress.
 enum class Plane { strain, stress };
+/// Volumes of points at the surface of round bodies: all the same, or what of the body they stand for.
+enum class Surface { whole, cut };
 enum class FaceType { free, fixed, symmetry, wall, periodic };
 
 /// How patches are dealt to ranks; never changes a result.
@@ -34,6 +36,7 @@ struct SolverOptions {
   double flip = 1.0;        // 1: FLIP, 0: PIC
   bool spin = true;         // points carry an angular velocity
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
+  Surface surface = Surface::whole;
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };
 
