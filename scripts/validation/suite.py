@@ -28,8 +28,10 @@ LITERAL = {
 
 # Other choices of the solver.
 SETTINGS = {update: {"solver.stress_update": f'"{update}"'} for update in ("first", "modified_last", "last")} | {
-    shape: {"solver.shape": f'"{shape}"'} for shape in ("linear", "bspline2")}
+    shape: {"solver.shape": f'"{shape}"'} for shape in ("linear", "bspline2")} | {
+    "cut": {"solver.surface": '"cut"'}}  # acts on round bodies only
 FORMS = LITERAL | SETTINGS
+OF_FLAT_BODIES = tuple(form for form in FORMS if form != "cut")
 
 
 def nothing_drawn(_folders: Folders, _out: Path) -> list[Path]:

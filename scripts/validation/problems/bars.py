@@ -13,7 +13,7 @@ from validation.closed_forms import bar_against_wall, pulse_length
 from validation.figures import Curve, Panel, draw_panels
 from validation.runs import Run
 from validation.series import motion
-from validation.suite import Folders, Problem
+from validation.suite import Folders, OF_FLAT_BODIES, Problem
 
 LENGTH, SPEED_OF_SOUND, DENSITY, MODULUS = 1.0, 1.0, 1.0, 1.0  # SI
 BULK, SHEAR = 1 / 3, 1 / 2  # [Pa]
@@ -117,4 +117,5 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("bars", "Two equal bars", "one-dimensional waves; Johnson, Contact Mechanics, section 11.1", runs,
-                  checks, draw, literal=tuple(label(closing, CELLS[1], GAPS[0]) for closing in CLOSING))
+                  checks, draw, literal=tuple(label(closing, CELLS[1], GAPS[0]) for closing in CLOSING),
+                  forms=OF_FLAT_BODIES)

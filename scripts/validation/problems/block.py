@@ -11,7 +11,7 @@ from validation.checks import Check, near
 from validation.figures import Curve, Panel, draw_panels
 from validation.runs import NO_PARTICLES, Run
 from validation.series import at_time, motion
-from validation.suite import Folders, Problem
+from validation.suite import Folders, OF_FLAT_BODIES, Problem
 
 GRAVITY, END = 9.81, 1.0  # [m/s2], [s]
 CELL = 0.05  # [m]
@@ -90,4 +90,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("block", "Block on an incline", "rigid block with Coulomb friction", runs, checks, draw,
-                  literal=tuple(label(kind, SOME[0]) for kind in KINDS))
+                  literal=tuple(label(kind, SOME[0]) for kind in KINDS), forms=OF_FLAT_BODIES)
