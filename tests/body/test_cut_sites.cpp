@@ -24,7 +24,6 @@ template <int Dim>
 struct Sums {
   double volume = 0;
   Vec3 moment = Vec3::Zero();
-  int points = 0;
 };
 
 template <int Dim>
@@ -51,7 +50,7 @@ Sums<Dim> sums_of(const Shape& shape) {
       EXPECT_GT(point.position[d], origin[d] + i[d] * h[d]);
       EXPECT_LT(point.position[d], origin[d] + (i[d] + 1) * h[d]);
     }
-    sums.volume += point.share * whole, sums.moment += point.share * whole * point.position, ++sums.points;
+    sums.volume += point.share * whole, sums.moment += point.share * whole * point.position;
   });
   return sums;
 }
