@@ -146,10 +146,16 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
 
 template <int Dim>
 void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                            const ContactSettings<Dim>& settings, const ContactSweep<Dim>& sweep,
-                            const std::vector<Body>& bodies) {
+                            const ContactSettings<Dim>& settings, const std::vector<Body>& bodies) {
   using N = NodeSums<Dim>;
   entries_.clear();
+  // A wall leaves a body half of a node's room: twice that is the room of which contact/gap.hpp speaks.
+  const double largest = contact::largest_gap_at_wall(settings.options.fill);
+  const auto touches = [&](const Piece<Dim>& piece, const Index<Dim>& i, double room) {
+    if (!piece.nodes.box.contains(i)) return false;
+    const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(piece.nodes.box.offset(i)) * N::width;
+    return sums[N::mass] > 0 && settings.distance(sums, lattice, 2 * room) <= largest;
+  };
   for_faces<Dim>(patch, lattice, faces, FaceType::wall, [&](int d, int side, int plane) {
     for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
       const auto& piece = patch.pieces[k];
@@ -163,8 +169,7 @@ void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice
           for (int s = 0; s < 2; ++s)
             if ((i[e] == 0 && s == 0) || (i[e] == lattice.cells()[e] && s == 1))
               if (faces[2 * e + s].type == FaceType::wall || faces[2 * e + s].type == FaceType::fixed) room *= 0.5;
-        const bool filled =
-            settings.options.release != Release::reaction || sweep.volume_at(i) >= settings.options.fill * room;
+        const bool near = settings.options.release != Release::reaction || touches(piece, i, room);
         Index<Dim> beyond = i;
         beyond[d] += side == 0 ? -1 : 1;
         const int first = static_cast<int>(entries_.size());
@@ -178,7 +183,7 @@ void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice
                               2 * d + side,
                               first,
                               sums[N::mass],
-                              filled,
+                              near,
                               lattice.owns_node(patch.id, place),
                               {},
                               faces[2 * d + side].friction[bodies[piece.body].material],

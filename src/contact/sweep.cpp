@@ -54,6 +54,15 @@ ContactSettings<Dim> ContactSettings<Dim>::make(const ContactOptions& options, s
 }
 
 template <int Dim>
+double ContactSettings<Dim>::distance(const double* sums, const Lattice<Dim>& lattice, double room) const {
+  using N = NodeSums<Dim>;
+  const double volume = sums[N::volume] / room;
+  double gradient = ConstNode<Dim>(sums + N::gradient).cwiseProduct(lattice.spacing()).norm() / room;
+  if (options.normals != NormalSource::volume_gradient) gradient *= sums[N::volume] / sums[N::mass];  // it is of mass
+  return contact::distance_to_surface(volume, gradient);
+}
+
+template <int Dim>
 void ContactSweep<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
                              const std::vector<Body>& bodies) {
   box_ = patch.nodes;
@@ -65,14 +74,10 @@ template <int Dim>
 void ContactSweep<Dim>::count_bodies(const Patch<Dim>& patch) {
   using N = NodeSums<Dim>;
   bodies_at_.assign(box_.size(), 0);
-  volume_.assign(box_.size(), 0.0);
   for (const auto& piece : patch.pieces) {
     const double* sums = piece.nodes.sums.data();
     for_each_row(piece.nodes.box, box_, [&](int at, int n) {
-      for (int i = 0; i < n; ++i, sums += N::width) {
-        bodies_at_[at + i] += sums[N::mass] > 0;
-        volume_[at + i] += sums[N::volume];
-      }
+      for (int i = 0; i < n; ++i, sums += N::width) bodies_at_[at + i] += sums[N::mass] > 0;
     });
   }
 }
@@ -130,8 +135,6 @@ void ContactSweep<Dim>::prepare(SharedNode& node, const Patch<Dim>& patch, const
       // On a symmetry plane sums hold both halves; beyond it they are the image of those inside.
       if (face == FaceType::symmetry) node.share *= place[d] == 0 || place[d] == lattice.cells()[d] ? 0.5 : 0.0;
     }
-  const bool filled =
-      volume_[box_.offset(place)] >= settings.options.fill * room || settings.options.release != Release::reaction;
   double total = 0;
   for (int i = 0; i < node.count; ++i) {
     total += entry[i].mass;
@@ -142,10 +145,32 @@ void ContactSweep<Dim>::prepare(SharedNode& node, const Patch<Dim>& patch, const
   for (int i = 0; i < node.count; ++i) {
     entry[i].law = settings.pair(bodies[patch.pieces[entry[i].piece].body].material, partner_material);
     const bool heavy_enough = entry[i].mass >= least_mass_share * total;
-    entry[i].open = !fixed && !entry[i].rigid && (merges(entry[i].law.law) || (filled && heavy_enough));
+    entry[i].open = !fixed && !entry[i].rigid && (merges(entry[i].law.law) || heavy_enough);
   }
+  if (settings.options.release == Release::reaction && settings.options.fill > 0)
+    set_gaps(node, patch, lattice, settings, room);
   set_normals(node, patch, lattice, settings.options.normal_choice);
   set_gates(node, patch, lattice, settings, bodies);
+}
+
+/// Shuts contact for bodies that are too far from the nearest other one.
+template <int Dim>
+void ContactSweep<Dim>::set_gaps(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                 const ContactSettings<Dim>& settings, double room) {
+  ContactEntry<Dim>* entry = &entries_[node.first];
+  const double largest = contact::largest_gap(settings.options.fill);
+  distances_.resize(node.count);
+  for (int i = 0; i < node.count; ++i) {
+    const double* sums = sums_at(patch.pieces[entry[i].piece], entry[i].node);
+    distances_[i] = settings.distance(sums, lattice, room);
+  }
+  for (int i = 0; i < node.count; ++i) {
+    if (merges(entry[i].law.law)) continue;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int j = 0; j < node.count; ++j)
+      if (j != i) nearest = std::min(nearest, distances_[j]);
+    if (distances_[i] + nearest > largest) entry[i].open = false;
+  }
 }
 
 template <int Dim>

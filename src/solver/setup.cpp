@@ -103,6 +103,7 @@ class Filler {
         materials_(materials),
         per_direction_(static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / Dim)))),
         bodies_of_(lattice.patch_count()) {
+    for (int d = 0; d < Dim; ++d) aside_[d] = 1e-7 * lattice.spacing()[d];
     for (int b = 0; b < static_cast<int>(c.bodies.size()); ++b) list_images(b);
   }
 
@@ -127,7 +128,7 @@ class Filler {
           Vec3 x = Vec3::Zero();
           for (int d = 0; d < Dim; ++d)
             x[d] = lattice_.lower()[d] + (cell[d] + (sub[d] + 0.5) / per_direction_) * lattice_.spacing()[d];
-          if (contains(shape, x - placed.shift)) f(placed.body, x, 1.0, placed.shift);
+          if (contains(shape, x - placed.shift + aside_)) f(placed.body, x, 1.0, placed.shift);
         });
       });
     }
@@ -213,6 +214,7 @@ class Filler {
     });
   }
 
+  Vec3 aside_ = Vec3::Zero();  // added to the points: one on a face that two bodies share goes to one of them
   const Case& case_;
   const Lattice<Dim>& lattice_;
   const std::vector<Body>& bodies_;

@@ -129,7 +129,7 @@ void Simulation<Dim>::contact_before_update(std::size_t p, Patch<Dim>& patch) {
   }
   const auto time = timers_.measure(Stage::contact);
   sweeps_[p].find(patch, lattice_, contact_, bodies_);
-  walls_[p].find(patch, lattice_, faces_, contact_, sweeps_[p], bodies_);
+  walls_[p].find(patch, lattice_, faces_, contact_, bodies_);
   sweeps_[p].first_pass(patch, lattice_, contact_, dt_);
   walls_[p].first_pass(patch, faces_, contact_, dt_);
 }

@@ -261,7 +261,7 @@ struct WallNode {
   }
   void first() {
     node.sweep.find(node.patch, node.lattice, settings, node.bodies);
-    wall.find(node.patch, node.lattice, faces, settings, node.sweep, node.bodies);
+    wall.find(node.patch, node.lattice, faces, settings, node.bodies);
     wall.first_pass(node.patch, faces, settings, node.dt);
   }
   void second() { wall.second_pass(node.patch, faces, settings, node.dt, false); }

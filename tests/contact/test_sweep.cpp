@@ -321,14 +321,5 @@ TEST(ContactSweep, KeepsWhatPassesBetweenPairs) {
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(sum.values[i], expected[i], 1e-13) << i;
 }
 
-TEST(ContactSweep, VolumeOfAllBodies) {
-  auto list = meeting_pair();
-  list[0].volume = 0.25, list[1].volume = 0.5;
-  NodePatch<2> node(list);
-  node.first(node.settings(options_of(ContactLaw::friction)));
-  EXPECT_DOUBLE_EQ(node.sweep.volume_at({3, 3}), 0.75);
-  EXPECT_DOUBLE_EQ(node.sweep.volume_at({2, 3}), 0);
-}
-
 }  // namespace
 }  // namespace cairn

@@ -66,5 +66,23 @@ TEST(BodyStates, CutSurfacesKeepMassAndCentre) {
   check_cut<3>(Vec3(0.06, 0.97, 0.51));
 }
 
+// Two boxes, turned or not, whose common face goes through points: each point belongs to one of them.
+TEST(BodyStates, BodiesThatTouchShareNoPoints) {
+  for (double middle : {0.5 + 0.25 / 24, 0.5 + 0.75 / 24, 0.51})
+    for (bool polygons : {false, true}) {
+      Case c = soft_case(2, 24, 4);
+      const auto add = [&](double low, double high) {
+        if (polygons)
+          add_body(c, Polygon{{Vec3(0.25, low, 0), Vec3(0.75, low, 0), Vec3(0.75, high, 0), Vec3(0.25, high, 0)}},
+                   Vec3::Zero(), Vec3::Zero());
+        else
+          add_body(c, BoxShape{Vec3(0.25, low, 0), Vec3(0.75, high, 0)}, Vec3::Zero(), Vec3::Zero());
+      };
+      add(0.25, middle), add(middle, 0.75);
+      Simulation<2> simulation(c, MPI_COMM_WORLD);
+      EXPECT_NEAR(simulation.totals().mass, 0.25 * c.materials[0].density, 1e-9 * c.materials[0].density);
+    }
+}
+
 }  // namespace
 }  // namespace cairn

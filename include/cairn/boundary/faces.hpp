@@ -43,9 +43,9 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
 template <int Dim>
 class WallContact {
  public:
-  /// Finds the nodes on walls from complete sums; `sweep` has found the patch's shared nodes.
+  /// Finds the nodes on walls from complete sums.
   void find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-            const ContactSettings<Dim>& settings, const ContactSweep<Dim>& sweep, const std::vector<Body>& bodies);
+            const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
   void first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt);
   void second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces, const ContactSettings<Dim>& settings, double dt,
                    bool last);

@@ -9,6 +9,7 @@
 
 #include "cairn/body/patch.hpp"
 #include "cairn/contact/course.hpp"
+#include "cairn/contact/gap.hpp"
 #include "cairn/contact/laws.hpp"
 #include "cairn/contact/ledger.hpp"
 
@@ -39,6 +40,9 @@ struct ContactSettings {
 
   static ContactSettings make(const ContactOptions& options, std::vector<ContactMaterial> materials,
                               const std::array<FaceType, 6>& faces);
+  /// Distance [cells] from a node to a body's near surface, from its NodeSums there (contact/gap.hpp). \param room
+  /// [m^Dim] that bodies around the node have: a cell, less where walls take a part.
+  double distance(const double* sums, const Lattice<Dim>& lattice, double room) const;
   const PairLaw& pair(int a, int b) const { return pairs[static_cast<std::size_t>(a) * materials.size() + b]; }
 };
 
@@ -73,9 +77,6 @@ class ContactSweep {
   /// On momenta projected again (NodeBox::velocity, before division by mass); closes the ledger.
   void repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
 
-  /// Volume of all bodies at a node of the patch [m^Dim].
-  double volume_at(const Index<Dim>& node) const { return volume_[box_.offset(node)]; }
-
  private:
   struct SharedNode {
     int first, count, partner;  // entries; position of the partner among them
@@ -89,6 +90,8 @@ class ContactSweep {
                     const std::vector<Body>& bodies);
   void prepare(SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
+  void set_gaps(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                const ContactSettings<Dim>& settings, double room);
   void set_normals(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice, NormalChoice choice);
   void set_gates(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                  const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
@@ -103,11 +106,11 @@ class ContactSweep {
 
   Box<Dim> box_;
   std::vector<std::int32_t> bodies_at_;  // bodies at each node of the patch; later the node's place in shared_
-  std::vector<double> volume_;
   std::vector<SharedNode> shared_;
   std::vector<ContactEntry<Dim>> entries_;
   std::vector<Body> turning_;                          // the rigid bodies among them that turn
   std::vector<Vec<Dim>> momenta_, forces_, impulses_;  // of the node in hand
+  std::vector<double> distances_;                      // likewise: from the node to the bodies' surfaces [cells]
 };
 
 }  // namespace cairn

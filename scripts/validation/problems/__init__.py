@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 
-NAMES = ("block", "disk", "sphere", "backspin", "disks", "bars", "hertz", "cylinder", "collinear", "zigzag", "waves",
+NAMES = ("block", "limits", "disk", "sphere", "backspin", "disks", "bars", "hertz", "cylinder", "collinear", "zigzag", "waves",
          "rotation", "grains")
 
 

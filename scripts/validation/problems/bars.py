@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from results import Run as Results
-from validation.checks import Check, near
+from validation.checks import Check, near, record
 from validation.closed_forms import bar_against_wall, pulse_length
 from validation.figures import Curve, Panel, draw_panels
 from validation.runs import Run
@@ -61,10 +61,10 @@ def finite_strain(closing: float) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate((flight, times)), np.concatenate(([-closing / 2] * 2, velocities))
 
 
+@functools.cache
 def exact_duration(closing: float) -> float:
-    """Linear, or of finite strain at 0.1 c [s]."""
-    if closing < 0.05:
-        return 2 * LENGTH / SPEED_OF_SOUND
+    """Of the fine grid's contact, measured like that of the bars [s]: 2 L/c less 3 % at 0.1 c, 0.5 % at 0.01 c. In the
+    limit of small strains it is 0.3 % short, from the measure itself."""
     start, end = pulse_length(*finite_strain(closing))
     return end - start
 
@@ -81,8 +81,8 @@ def check_one(case: str, folder: Path) -> list[Check]:
     path = motion(folder, 1)
     start, end = pulse_length(path["time"], path["vx"])
     rebound = 2 * path["vx"][-1] / closing
-    found = [near(case, f"contact lasts [L/c] ({'finite strain' if closing > 0.05 else '2'})", end - start,
-                  exact_duration(closing), 0.005)]
+    found = [near(case, "contact lasts [L/c]", end - start, exact_duration(closing), 0.005),
+             record(case, "contact lasts [L/c], linear", end - start, 2 * LENGTH / SPEED_OF_SOUND)]
     if closing < 0.05:
         stress = joint_stress(folder, start + 0.6 * LENGTH / SPEED_OF_SOUND)
         found.append(near(case, "stress at the joint, 0.6 L/c after touch / (rho c v/2)",
