@@ -152,7 +152,6 @@ void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice
   // A wall leaves a body half of a node's room: twice that is the room of which contact/gap.hpp speaks.
   const double largest = contact::largest_gap_at_wall(settings.options.fill);
   const auto touches = [&](const Piece<Dim>& piece, const Index<Dim>& i, double room) {
-    if (!piece.nodes.box.contains(i)) return false;
     const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(piece.nodes.box.offset(i)) * N::width;
     return sums[N::mass] > 0 && settings.distance(sums, lattice, 2 * room) <= largest;
   };

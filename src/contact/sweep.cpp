@@ -31,6 +31,12 @@ constexpr double least_mass_share = 1e-6;
 /// Normal tractions below this share of the longitudinal modulus count as none.
 constexpr double stress_free_share = 1e-9;
 
+/// Size of a gradient in shares of the volume `room`, for cells of size 1.
+template <int Dim>
+double share_of(const Vec<Dim>& gradient, const Lattice<Dim>& lattice, double room) {
+  return gradient.cwiseProduct(lattice.spacing()).norm() / room;
+}
+
 bool merges(ContactLaw law) { return law == ContactLaw::none || law == ContactLaw::stick; }
 
 }  // namespace
@@ -57,7 +63,7 @@ template <int Dim>
 double ContactSettings<Dim>::distance(const double* sums, const Lattice<Dim>& lattice, double room) const {
   using N = NodeSums<Dim>;
   const double volume = sums[N::volume] / room;
-  double gradient = ConstNode<Dim>(sums + N::gradient).cwiseProduct(lattice.spacing()).norm() / room;
+  double gradient = share_of<Dim>(ConstNode<Dim>(sums + N::gradient), lattice, room);
   if (options.normals != NormalSource::volume_gradient) gradient *= sums[N::volume] / sums[N::mass];  // it is of mass
   return contact::distance_to_surface(volume, gradient);
 }
@@ -183,7 +189,7 @@ void ContactSweep<Dim>::set_normals(const SharedNode& node, const Patch<Dim>& pa
   const auto flatness = [&](const ContactEntry<Dim>& e, const Vec<Dim>& g) {
     const double volume = sums_at(patch.pieces[e.piece], e.node)[NodeSums<Dim>::volume] / lattice.cell_volume();
     const double flat = std::sqrt(2 * std::clamp(std::min(volume, 1 - volume), 0.0, 0.5));
-    const double size = g.cwiseProduct(lattice.spacing()).norm() / lattice.cell_volume();
+    const double size = share_of<Dim>(g, lattice, lattice.cell_volume());
     return size < 0.1 ? size : size / (flat + 0.02);
   };
   const auto& partner = entry[node.partner];

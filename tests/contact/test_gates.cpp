@@ -64,6 +64,7 @@ TEST(ContactGates, BodiesTouchAcrossSmallGapsHoweverThinTheyAre) {
   EXPECT_FALSE(acts(apart(largest + 1e-6, 0.1, 0.5, 0.5), options, 0, {w, f, f, f}));
   EXPECT_TRUE(acts(apart(largest - 1e-6, 0.1, 0.5, 0.5), options, 0, {w, f, f, f}));
   EXPECT_TRUE(acts(apart(largest - 1e-6, 0.1, 0.5, 0.25), options, 8, {f, w, f, w}));
+  EXPECT_FALSE(acts(apart(largest - 1e-6, 0.1, 0.5, 0.25), options, 0, {f, w, f, w}));  // those walls are far away
   EXPECT_FALSE(acts(apart(0, 0, 3), options, 0, {FaceType::fixed, f, f, f}));
   // Only the predicted reaction asks; sticking joins whatever there is; without `fill` so does contact.
   options.release = Release::approach;

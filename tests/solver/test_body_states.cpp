@@ -66,7 +66,7 @@ TEST(BodyStates, CutSurfacesKeepMassAndCentre) {
   check_cut<3>(Vec3(0.06, 0.97, 0.51));
 }
 
-// Two boxes, turned or not, whose common face goes through points: each point belongs to one of them.
+// Two halves of a square whose common face goes through points, along the grid or across it: each point is of one half.
 TEST(BodyStates, BodiesThatTouchShareNoPoints) {
   for (double middle : {0.5 + 0.25 / 24, 0.5 + 0.75 / 24, 0.51})
     for (bool polygons : {false, true}) {
@@ -82,6 +82,14 @@ TEST(BodyStates, BodiesThatTouchShareNoPoints) {
       Simulation<2> simulation(c, MPI_COMM_WORLD);
       EXPECT_NEAR(simulation.totals().mass, 0.25 * c.materials[0].density, 1e-9 * c.materials[0].density);
     }
+  for (double other : {0.25, 0.75}) {  // both diagonals
+    Case c = soft_case(2, 24, 4);
+    const Vec3 a(0.25, other, 0), b(0.75, 1 - other, 0);
+    for (double side : {0.25, 0.75})
+      add_body(c, Polygon{{a, b, Vec3(side == other ? 0.75 : 0.25, side, 0)}}, Vec3::Zero(), Vec3::Zero());
+    Simulation<2> simulation(c, MPI_COMM_WORLD);
+    EXPECT_NEAR(simulation.totals().mass, 0.25 * c.materials[0].density, 1e-9 * c.materials[0].density);
+  }
 }
 
 }  // namespace
