@@ -144,127 +144,6 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
                        });
 }
 
-template <int Dim>
-void WallContact<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                            const ContactSettings<Dim>& settings, const std::vector<Body>& bodies) {
-  using N = NodeSums<Dim>;
-  entries_.clear();
-  // A wall leaves a body half of a node's room: twice that is the room of which contact/gap.hpp speaks.
-  const double largest = contact::largest_gap_at_wall(settings.options.fill);
-  const auto touches = [&](const Piece<Dim>& piece, const Index<Dim>& i, double room) {
-    const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(piece.nodes.box.offset(i)) * N::width;
-    return sums[N::mass] > 0 && settings.distance(sums, lattice, 2 * room) <= largest;
-  };
-  for_faces<Dim>(patch, lattice, faces, FaceType::wall, [&](int d, int side, int plane) {
-    for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
-      const auto& piece = patch.pieces[k];
-      if (bodies[piece.body].rigid) continue;
-      const Box<Dim>& box = piece.nodes.box;
-      Box<Dim> on_wall = box;
-      on_wall.lower[d] = plane, on_wall.upper[d] = plane + 1;
-      for_each(intersection(on_wall, box), [&](const Index<Dim>& i) {
-        double room = lattice.cell_volume();
-        for (int e = 0; e < Dim; ++e)
-          for (int s = 0; s < 2; ++s)
-            if ((i[e] == 0 && s == 0) || (i[e] == lattice.cells()[e] && s == 1))
-              if (faces[2 * e + s].type == FaceType::wall || faces[2 * e + s].type == FaceType::fixed) room *= 0.5;
-        const bool near = settings.options.release != Release::reaction || touches(piece, i, room);
-        Index<Dim> beyond = i;
-        beyond[d] += side == 0 ? -1 : 1;
-        const int first = static_cast<int>(entries_.size());
-        for (const Index<Dim>& place : {i, beyond}) {
-          if (!box.contains(place)) continue;
-          const int node = box.offset(place);
-          const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(node) * N::width;
-          if (!(sums[N::mass] > 0)) continue;
-          entries_.push_back({static_cast<int>(k),
-                              node,
-                              2 * d + side,
-                              first,
-                              sums[N::mass],
-                              near,
-                              lattice.owns_node(patch.id, place),
-                              {},
-                              faces[2 * d + side].friction[bodies[piece.body].material],
-                              {}});
-        }
-      });
-    }
-  });
-}
-
-template <int Dim>
-Vec<Dim> WallContact<Dim>::impulse(const Entry& entry, const Vec<Dim>& momentum, const FaceConditions<Dim>& faces,
-                                   const ContactSettings<Dim>& settings, bool second) const {
-  using namespace contact;
-  Vec<Dim> n = Vec<Dim>::Zero();
-  n[entry.face / 2] = entry.face % 2 == 0 ? -1 : 1;
-  const Vec<Dim> P = momentum - entry.mass * faces[entry.face].velocity;
-  if (entry.law.law == ContactLaw::none || entry.law.law == ContactLaw::stick) return -P;
-  // Stress at a wall is one-sided, so that both papers' releases reduce to approach there.
-  if (settings.options.release != Release::reaction) return approach_impulse<Dim>(P, n, entry.law.friction);
-  return second ? reaction_impulse<Dim>(P, n, entry.decision, entry.law.friction)
-                : hold_impulse<Dim>(P, n, entry.decision);
-}
-
-template <int Dim>
-void WallContact<Dim>::first_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
-                                  const ContactSettings<Dim>& settings, double dt) {
-  for (std::size_t e = 0; e < entries_.size(); ++e) {
-    Entry& entry = entries_[e];
-    Piece<Dim>& piece = patch.pieces[entry.piece];
-    auto momentum = momentum_of(piece, entry.node);
-    if (entry.on_wall != static_cast<int>(e))
-      entry.decision = entries_[entry.on_wall].decision;
-    else if (entry.open) {
-      Vec<Dim> n = Vec<Dim>::Zero();
-      n[entry.face / 2] = entry.face % 2 == 0 ? -1 : 1;
-      const Vec<Dim> P = momentum - entry.mass * faces[entry.face].velocity;
-      const Vec<Dim> F = vector_of<Dim>(piece.nodes.force, entry.node);
-      entry.decision = contact::decide_by_reaction<Dim>(P, F, n, entry.law.friction, dt);
-    }
-    entry.record.projected = momentum;
-    if (settings.options.passes == Passes::after) continue;
-    entry.record.first = impulse(entry, momentum, faces, settings, false);
-    momentum += entry.record.first;
-  }
-}
-
-template <int Dim>
-void WallContact<Dim>::second_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
-                                   const ContactSettings<Dim>& settings, double dt, bool last) {
-  for (Entry& entry : entries_) {
-    Piece<Dim>& piece = patch.pieces[entry.piece];
-    auto force = vector_of<Dim>(piece.nodes.force, entry.node);
-    const Vec<Dim> momentum = momentum_of(piece, entry.node) + dt * force;
-    entry.record.force = force;
-    entry.record.second = impulse(entry, momentum, faces, settings, true);
-    force += entry.record.second / dt;
-    patch.ledger.contact_nodes += entry.owned && !entry.record.second.isZero(0);
-    if (last) keep_ledger(entry, patch, faces, entry.record.given(entry.mass, dt));
-  }
-}
-
-template <int Dim>
-void WallContact<Dim>::repeat_pass(Patch<Dim>& patch, const FaceConditions<Dim>& faces,
-                                   const ContactSettings<Dim>& settings, double dt) {
-  for (const Entry& entry : entries_) {
-    auto momentum = vector_of<Dim>(patch.pieces[entry.piece].nodes.velocity, entry.node);
-    const Vec<Dim> again = momentum, repeat = impulse(entry, again, faces, settings, false);
-    momentum += repeat;
-    keep_ledger(entry, patch, faces, entry.record.given(entry.mass, dt, again, repeat));
-  }
-}
-
-template <int Dim>
-void WallContact<Dim>::keep_ledger(const Entry& entry, Patch<Dim>& patch, const FaceConditions<Dim>& faces,
-                                   double given) const {
-  if (!entry.owned) return;
-  const double work = entry.record.second.dot(faces[entry.face].velocity);
-  patch.ledger.boundary_work += work;
-  patch.ledger.contact_dissipation += work - given;
-}
-
 #define CAIRN_INSTANTIATE(Dim)                                                                   \
   template void mirror_sums(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);       \
   template void mirror_vectors(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,     \
@@ -272,8 +151,7 @@ void WallContact<Dim>::keep_ledger(const Entry& entry, Patch<Dim>& patch, const 
   template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, \
                                    const std::vector<Body>&, bool);                              \
   template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,   \
-                                 const std::vector<Body>&, double, bool);                        \
-  template class WallContact<Dim>;
+                                 const std::vector<Body>&, double, bool);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

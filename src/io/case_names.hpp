@@ -17,6 +17,7 @@ inline constexpr Named<ContactLaw> contact_law_names[] = {{"none", ContactLaw::n
                                                           {"friction", ContactLaw::friction}};
 inline constexpr Named<Release> release_names[] = {
     {"approach", Release::approach}, {"traction", Release::traction}, {"reaction", Release::reaction}};
+inline constexpr Named<GapRule> gap_rule_names[] = {{"pressure", GapRule::pressure}, {"fill", GapRule::fill}};
 inline constexpr Named<NormalSource> normal_source_names[] = {{"density", NormalSource::density},
                                                               {"mass_gradient", NormalSource::mass_gradient},
                                                               {"volume_gradient", NormalSource::volume_gradient}};
@@ -31,6 +32,10 @@ inline constexpr Named<Passes> passes_names[] = {
 inline constexpr Named<FaceType> face_type_names[] = {
     {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
 inline constexpr Named<Surface> surface_names[] = {{"whole", Surface::whole}, {"cut", Surface::cut}};
+inline constexpr Named<NoiseFilter> noise_filter_names[] = {{"off", NoiseFilter::off},
+                                                            {"weak", NoiseFilter::weak},
+                                                            {"strong", NoiseFilter::strong},
+                                                            {"xpic", NoiseFilter::xpic}};
 inline constexpr Named<Plane> plane_names[] = {{"strain", Plane::strain}, {"stress", Plane::stress}};
 inline constexpr Named<Partition> partition_names[] = {{"metis", Partition::metis},
                                                        {"round_robin", Partition::round_robin}};

@@ -196,6 +196,8 @@ void read_solver(Table solver, int dimension, SolverOptions& result) {
                                                 dimension == 2 ? "square number" : "cube number",
                                                 dimension == 2 ? "1, 4, 9, 16, 25, 36, 49, 64" : "1, 8, 27, 64, 125"));
   result.surface = solver.choice("surface", surface_names, Surface::whole);
+  result.noise_filter = solver.choice("noise_filter", noise_filter_names, result.noise_filter);
+  result.noise_order = static_cast<int>(solver.integer("noise_order", result.noise_order, 1, 20));
   result.energy_limit = solver.number("energy_limit", 0.0, not_negative);
   solver.finish();
 }
@@ -204,6 +206,8 @@ void read_contact(Table contact, const std::vector<Material>& materials, Contact
   c.law = contact.choice("law", contact_law_names, c.law);
   c.release = contact.choice("release", release_names, c.release);
   c.friction = contact.number("friction", c.friction, friction_range);
+  // Who says how large a stand-off is wants one.
+  c.gap = contact.choice("gap", gap_rule_names, contact.has("fill") ? GapRule::fill : GapRule::pressure);
   c.fill = contact.number("fill", c.fill, {0, 1});
   c.impulse_limit = contact.number("impulse_limit", c.impulse_limit, not_negative);
   c.normals = contact.choice("normals", normal_source_names, c.normals);

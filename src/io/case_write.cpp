@@ -132,6 +132,8 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   out.key("spin", solver.spin);
   out.key("points_per_cell", solver.points_per_cell);
   out.key("surface", name_of(surface_names, solver.surface));
+  out.key("noise_filter", name_of(noise_filter_names, solver.noise_filter));
+  out.key("noise_order", solver.noise_order);
   out.key("energy_limit", solver.energy_limit);
 }
 
@@ -141,6 +143,7 @@ void write_contact(Writer& out, const Case& c) {
   out.key("law", name_of(contact_law_names, contact.law));
   out.key("release", name_of(release_names, contact.release));
   out.key("friction", contact.friction);
+  out.key("gap", name_of(gap_rule_names, contact.gap));
   out.key("fill", contact.fill);
   out.key("impulse_limit", contact.impulse_limit);
   out.key("normals", name_of(normal_source_names, contact.normals));

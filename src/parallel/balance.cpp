@@ -24,10 +24,7 @@ void put_piece(const Piece<Dim>& piece, Message& message) {
 template <int Dim>
 void put_patch(const Patch<Dim>& patch, Message& message) {
   message.put(std::int64_t{patch.id});
-  message.put(patch.ledger.contact_dissipation);
-  message.put(patch.ledger.boundary_work);
-  message.put(patch.ledger.blended_and_spun);
-  message.put(patch.ledger.contact_nodes);
+  for (const auto& column : ledger_columns) message.put(patch.ledger.*column.value);
   message.put(static_cast<std::int64_t>(patch.contacts.size()));
   for (const auto& [pair, sum] : patch.contacts) {
     message.put(std::int64_t{pair.first}), message.put(std::int64_t{pair.second});
@@ -42,10 +39,7 @@ void put_patch(const Patch<Dim>& patch, Message& message) {
 template <int Dim>
 Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim>& lattice) {
   Patch<Dim> patch(static_cast<int>(message.integer(at++)), lattice);
-  patch.ledger.contact_dissipation = *message.data(at++);
-  patch.ledger.boundary_work = *message.data(at++);
-  patch.ledger.blended_and_spun = *message.data(at++);
-  patch.ledger.contact_nodes = message.integer(at++);
+  for (const auto& column : ledger_columns) patch.ledger.*column.value = *message.data(at++);
   for (std::int64_t n = message.integer(at++); n > 0; --n) {
     const int a = static_cast<int>(message.integer(at++)), b = static_cast<int>(message.integer(at++));
     auto& sum = patch.contacts[{a, b}];

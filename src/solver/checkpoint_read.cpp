@@ -69,12 +69,10 @@ void read_ledgers(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches) {
   // The counts are known, and shown here to be what was written.
   for (const char* name : {"patch_points", "patch_pieces", "patch_contacts"})
     in.template read_patches<std::int64_t>(name);
-  const auto dissipation = in.template read_patches<double>("contact_dissipation");
-  const auto work = in.template read_patches<double>("boundary_work");
-  const auto numerical = in.template read_patches<double>("blended_and_spun");
-  const auto nodes = in.template read_patches<std::int64_t>("contact_nodes");
-  for (std::size_t p = 0; p < patches.size(); ++p)
-    patches[p].ledger = {dissipation[p], work[p], numerical[p], nodes[p]};
+  for (const auto& column : ledger_columns) {
+    const auto values = in.template read_patches<double>(column.name);
+    for (std::size_t p = 0; p < patches.size(); ++p) patches[p].ledger.*column.value = values[p];
+  }
   in.settle();
 }
 
@@ -201,7 +199,7 @@ void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const std::vector<Body>&
                       const std::vector<SolverMaterial>& materials) const {
   const Layout layout{points_, pieces_, contacts_};
   const int states = most_states(materials);
-  constexpr int columns_besides_quantities = 14;
+  constexpr int columns_besides_quantities = 10 + static_cast<int>(std::size(ledger_columns));
   const int columns = columns_besides_quantities + static_cast<int>(quantities<Dim>(states).size());
   ColumnReader<Dim> in(reader_, patches, points_.size(), columns);
   read_ledgers(in, patches);

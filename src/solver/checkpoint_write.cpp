@@ -78,10 +78,8 @@ void write_patches(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patche
   out.template write_patches<std::int64_t>("patch_points", [&](const P& p) { return layout.points[p.id]; });
   out.template write_patches<std::int64_t>("patch_pieces", [&](const P& p) { return layout.pieces[p.id]; });
   out.template write_patches<std::int64_t>("patch_contacts", [&](const P& p) { return layout.contacts[p.id]; });
-  out.template write_patches<double>("contact_dissipation", [](const P& p) { return p.ledger.contact_dissipation; });
-  out.template write_patches<double>("boundary_work", [](const P& p) { return p.ledger.boundary_work; });
-  out.template write_patches<double>("blended_and_spun", [](const P& p) { return p.ledger.blended_and_spun; });
-  out.template write_patches<std::int64_t>("contact_nodes", [](const P& p) { return p.ledger.contact_nodes; });
+  for (const auto& column : ledger_columns)
+    out.template write_patches<double>(column.name, [&](const P& p) { return p.ledger.*column.value; });
 
   std::vector<std::int32_t> body, states, pairs;
   std::vector<std::int64_t> count;

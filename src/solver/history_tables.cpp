@@ -20,7 +20,8 @@ std::vector<std::string> history_columns(int dimension) {
                                     "momentum_x",
                                     "momentum_y"};
   if (dimension == 3) names.emplace_back("momentum_z");
-  names.insert(names.end(), {"contact_nodes", "mass", "viscous_dissipation", "numerical_dissipation"});
+  names.insert(names.end(), {"contact_nodes", "mass", "viscous_dissipation", "numerical_dissipation",
+                             "filter_dissipation", "contact_gain", "points_stopped"});
   return names;
 }
 
@@ -57,6 +58,9 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   row.emplace_back(t.mass);
   row.emplace_back(t.viscous);
   row.emplace_back(t.numerical);
+  row.emplace_back(t.filtered);
+  row.emplace_back(t.contact_gain);
+  row.emplace_back(static_cast<std::int64_t>(t.stopped));
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

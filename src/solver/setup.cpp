@@ -247,25 +247,26 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
       parallel_(c.parallel),
       limits_(c.time),
       lattice_(make_lattice<Dim>(c.domain)),
-      transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))),
-      faces_(make_faces<Dim>(c)) {
+      transfer_(TransferSettings<Dim>::make(c.solver, c.contact, head<Dim>(c.domain.gravity))) {
   MPI_Comm_rank(comm_, &rank_);
   MPI_Comm_size(comm_, &ranks_);
   std::vector<ContactMaterial> contact_materials;
   for (const auto& spec : c.materials) {
     materials_.push_back(make_material(spec));
-    contact_materials.push_back({materials_.back().longitudinal_modulus});
-    speeds_.wave = std::max(speeds_.wave, std::sqrt(materials_.back().longitudinal_modulus / spec.density));
+    const double modulus = materials_.back().longitudinal_modulus, speed = std::sqrt(modulus / spec.density);
+    contact_materials.push_back({modulus, speed});
+    speeds_.wave = std::max(speeds_.wave, speed);
   }
-  std::array<FaceType, 6> types{};
-  for (int f = 0; f < 2 * Dim; ++f) types[f] = faces_[f].type;
-  contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, types);
+  contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, make_faces<Dim>(c));
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   contact_.chords = c.solver.stress_update == StressUpdate::both;
   bodies_ = make_bodies(c, materials_);
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
   for (int d = 0; d < Dim; ++d)
-    for (int side = 0; side < 2; ++side) transfer_.mirrored[d][side] = faces_[2 * d + side].type == FaceType::symmetry;
+    for (int side = 0; side < 2; ++side) {
+      const FaceType type = contact_.faces[2 * d + side].type;
+      transfer_.mirrored[d][side] = type == FaceType::symmetry, transfer_.walled[d][side] = type == FaceType::wall;
+    }
   transfer_of_turning_ = transfer_;
   transfer_of_turning_.spin = true;
   if (from)

@@ -55,6 +55,7 @@ void Simulation<Dim>::step(double longest) {
   const double share = update == StressUpdate::both ? 0.5 : 1.0;
 
   choose_time_step(longest);
+  filter_noise();
   exchange_->begin_sums(transfer_.extras);
   exchange_after([&](std::size_t, P& patch) { project_points(patch); });
   if (first) {
@@ -125,13 +126,11 @@ void Simulation<Dim>::contact_before_update(std::size_t p, Patch<Dim>& patch) {
     const auto time = timers_.measure(Stage::exchange);
     fetch_nodes(patch);
     exchange_->add(patch, p);
-    mirror_sums(patch, lattice_, faces_);
+    mirror_sums(patch, lattice_, contact_.faces);
   }
   const auto time = timers_.measure(Stage::contact);
   sweeps_[p].find(patch, lattice_, contact_, bodies_);
-  walls_[p].find(patch, lattice_, faces_, contact_, bodies_);
   sweeps_[p].first_pass(patch, lattice_, contact_, dt_);
-  walls_[p].first_pass(patch, faces_, contact_, dt_);
 }
 
 template <int Dim>
@@ -142,7 +141,7 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
     velocities_.lend(piece.nodes.velocity);
     velocity_from_sums(piece);
   }
-  constrain_velocity(patch, lattice_, faces_, bodies_, false);
+  constrain_velocity(patch, lattice_, contact_.faces, bodies_, false);
   for_pieces(patch, {{C::position, C::velocity}, {C::deformation, all_columns}}, [&](Piece<Dim>& piece) {
     const auto& material = material_of(piece);
     if (is_rigid(piece))
@@ -158,7 +157,7 @@ void Simulation<Dim>::complete_forces(std::size_t p, Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::exchange);
   fetch_nodes(patch);
   exchange_->add(patch, p);
-  mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::force);
+  mirror_vectors(patch, lattice_, contact_.faces, &NodeBox<Dim>::force);
 }
 
 template <int Dim>
@@ -166,14 +165,13 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
   {
     const auto time = timers_.measure(Stage::contact);
     sweeps_[p].second_pass(patch, lattice_, contact_, dt_, last);
-    walls_[p].second_pass(patch, faces_, contact_, dt_, last);
   }
   const auto time = timers_.measure(Stage::integrate);
   for (auto& piece : patch.pieces) {
     motions_.lend(piece.nodes.motion);
     integrate(piece, dt_);
   }
-  constrain_motion(patch, lattice_, faces_, bodies_, dt_, last);
+  constrain_motion(patch, lattice_, contact_.faces, bodies_, dt_, last);
 }
 
 template <int Dim>
@@ -194,13 +192,12 @@ void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
   {
     const auto time = timers_.measure(Stage::exchange);
     exchange_->add(patch, p);
-    mirror_vectors(patch, lattice_, faces_, &NodeBox<Dim>::velocity);
+    mirror_vectors(patch, lattice_, contact_.faces, &NodeBox<Dim>::velocity);
   }
   const auto time = timers_.measure(Stage::contact);
   sweeps_[p].repeat_pass(patch, lattice_, contact_, dt_);
-  walls_[p].repeat_pass(patch, faces_, contact_, dt_);
   for (auto& piece : patch.pieces) velocity_from_momentum(piece);
-  constrain_velocity(patch, lattice_, faces_, bodies_, true);
+  constrain_velocity(patch, lattice_, contact_.faces, bodies_, true);
   for (auto& piece : patch.pieces) centre_motion(piece);
 }
 
@@ -213,6 +210,7 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
   const auto time = timers_.measure(strained ? Stage::update : Stage::stress);
   for_pieces(patch, {{C::position, strained ? C::state : all_columns}}, [&](Piece<Dim>& piece) {
     finish_piece(patch, piece, share);
+    patch.ledger.stopped += static_cast<double>(std::exchange(speeds_.stopped, 0));
     if (!projects_again()) motions_.take_back(piece.nodes.motion), velocities_.take_back(piece.nodes.velocity);
     if (all_inside(piece, lattice_, patch.id)) {
       project_ahead(piece);
@@ -332,7 +330,6 @@ void Simulation<Dim>::connect_patches() {
     for (const auto& link : patch.links) neighbours.insert(owner_[link.patch]);
   neighbours.erase(rank_);
   sweeps_.assign(patches_.size(), {});
-  walls_.assign(patches_.size(), {});
   const Traffic traffic = messages_ ? messages_->traffic() : Traffic{};
   messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
   messages_->traffic() = traffic;

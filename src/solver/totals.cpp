@@ -5,9 +5,9 @@
 namespace cairn {
 namespace {
 
-constexpr int sum_count = 13;
+constexpr int sum_count = 16;
 using Sums = std::array<double, sum_count>;  // kinetic, strain, potential, plastic, dissipation, work, momentum, mass,
-                                             // nodes, viscous, numerical
+                                             // nodes, viscous, numerical, filtered, gain, stopped
 
 /// One point's deformation gradient.
 template <int Dim>
@@ -62,7 +62,8 @@ Totals Simulation<Dim>::totals() const {
     Sums sums{};
     for (const auto& piece : patch.pieces) add_piece(*this, piece, transfer_.gravity, sums);
     sums[4] = patch.ledger.contact_dissipation, sums[5] = patch.ledger.boundary_work;
-    sums[10] = static_cast<double>(patch.ledger.contact_nodes), sums[12] += patch.ledger.blended_and_spun;
+    sums[10] = patch.ledger.contact_nodes, sums[12] += patch.ledger.blended_and_spun;
+    sums[13] = patch.ledger.filtered, sums[14] = patch.ledger.contact_gain, sums[15] = patch.ledger.stopped;
     mine.push_back(patch.id);
     mine.insert(mine.end(), sums.begin(), sums.end());
   }
@@ -77,6 +78,7 @@ Totals Simulation<Dim>::totals() const {
   t.contact_dissipation = sums[4], t.boundary_work = sums[5];
   t.momentum = Vec3(sums[6], sums[7], sums[8]);
   t.mass = sums[9], t.contact_nodes = sums[10], t.viscous = sums[11], t.numerical = sums[12];
+  t.filtered = sums[13], t.contact_gain = sums[14], t.stopped = sums[15];
   return t;
 }
 

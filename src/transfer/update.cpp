@@ -102,13 +102,36 @@ void scatter_momentum(const Points<Dim>& points, int p, const Stencil<Dim, Shape
   scatter_moving<no_gradient>(points, p, stencil, lane, mass, Lanes4{}, momentum);
 }
 
-/// x_p += dt sum N v; returns the larger of `fastest` and its squared speed, infinite where that is not finite.
+/// The faces that no point crosses.
 template <int Dim>
-double move(Points<Dim>& points, int p, const PointMotion<Dim>& m, double dt, double fastest) {
+struct Walls {
+  Vec<Dim> lower, upper;
+
+  Walls(const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings) {
+    constexpr double nowhere = std::numeric_limits<double>::infinity();
+    for (int d = 0; d < Dim; ++d) {
+      lower[d] = settings.walled[d][0] ? lattice.lower()[d] : -nowhere;
+      upper[d] = settings.walled[d][1] ? lattice.upper()[d] : nowhere;
+    }
+  }
+  /// Where a point that moves from a to b stops; one that is beyond already goes no further.
+  double stop(int d, double a, double b) const {
+    return std::min(std::max(b, std::min(a, lower[d])), std::max(a, upper[d]));
+  }
+};
+
+/// x_p += dt sum N v, up to the walls; returns the larger of `fastest` and its squared speed, infinite where that is
+/// not finite.
+template <int Dim>
+double move(Points<Dim>& points, int p, const PointMotion<Dim>& m, const Walls<Dim>& walls, double dt, double fastest,
+            std::int64_t& stopped) {
   using C = PointColumns<Dim>;
   double squared = 0;
   for (int d = 0; d < Dim; ++d) {
-    points.column(d)[p] += dt * m.sum[NodeMotion<Dim>::velocity + d];
+    double& x = points.column(d)[p];
+    const double free = x + dt * m.sum[NodeMotion<Dim>::velocity + d];
+    x = walls.stop(d, x, free);
+    stopped += x != free && free == free;
     const double v = points.column(C::velocity + d)[p];
     squared += v * v;
   }
@@ -135,6 +158,7 @@ template <int Dim>
 void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                             const Law& law, double density, double strain_dt, double dt, SpeedLimits& speeds) {
   double fastest_wave = speeds.wave * speeds.wave, fastest_point = speeds.point * speeds.point;
+  const Walls<Dim> walls(lattice, settings);
   std::visit(
       [&](const auto& any) {
         const auto& concrete = law_of_step(any, strain_dt);
@@ -143,12 +167,12 @@ void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
           fastest_wave = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest_wave);
           for (int lane = 0; lane < count; ++lane) {
             const auto m = gather_motion(stencil, lane, piece.nodes.motion.data());
-            fastest_point = move(piece.points, first + lane, m, dt, fastest_point);
+            fastest_point = move(piece.points, first + lane, m, walls, dt, fastest_point, speeds.stopped);
           }
         });
       },
       law);
-  speeds = {std::sqrt(fastest_wave), std::sqrt(fastest_point)};
+  speeds.wave = std::sqrt(fastest_wave), speeds.point = std::sqrt(fastest_point);
 }
 
 template <int Dim>
@@ -201,9 +225,10 @@ template <int Dim>
 double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                            double density, double dt, SpeedLimits& speeds) {
   double energy = 0, fastest = speeds.point * speeds.point;
+  const Walls<Dim> walls(lattice, settings);
   for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
     energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto& m) {
-      fastest = move(piece.points, first + lane, m, dt, fastest);
+      fastest = move(piece.points, first + lane, m, walls, dt, fastest, speeds.stopped);
     });
   });
   speeds.point = std::sqrt(fastest);
@@ -231,6 +256,31 @@ double accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, co
     });
   });
   return energy;
+}
+
+template <int Dim>
+void subtract_seen(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings) {
+  using C = PointColumns<Dim>;
+  using M = NodeMotion<Dim>;
+  NodeBox<Dim>& nodes = piece.nodes;
+  nodes.motion.assign(nodes.box.size() * M::width, 0.0);
+  for (std::size_t node = 0; node < nodes.box.size(); ++node)
+    std::copy_n(nodes.velocity.data() + node * vector_width, Dim, nodes.motion.data() + node * M::width + M::velocity);
+  for_moving_piece(piece, lattice, settings,
+                   [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
+                     for (int lane = 0; lane < count; ++lane) {
+                       const PointMotion<Dim> m = gather_motion(stencil, lane, nodes.motion.data());
+                       for (int d = 0; d < Dim; ++d)
+                         piece.points.column(C::velocity + d)[first + lane] -= m.sum[M::velocity + d];
+                       if constexpr (Stencil<Dim, Shape>::spinning)
+                         for_spins<Dim>([&](int s, int i, int j) {
+                           const double inertia = stencil.spread[i][lane] + stencil.spread[j][lane];
+                           double& w = piece.points.column(C::spin + s)[first + lane];
+                           const double curl = m.moment[i][M::velocity + j] - m.moment[j][M::velocity + i];
+                           w = inertia > 0 ? w - curl / inertia : 0.0;
+                         });
+                     }
+                   });
 }
 
 template <int Dim>
@@ -332,6 +382,7 @@ void velocity_from_motion(Piece<Dim>& piece) {
   template void velocity_from_sums(Piece<Dim>&);                                                                      \
   template void velocity_from_momentum(Piece<Dim>&);                                                                  \
   template void velocity_from_motion(Piece<Dim>&);                                                                    \
+  template void subtract_seen(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&);                        \
   template void centre_motion(Piece<Dim>&);                                                                           \
   template std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>&, const Lattice<Dim>&,       \
                                                                         const TransferSettings<Dim>&);

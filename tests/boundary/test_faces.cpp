@@ -245,32 +245,26 @@ TEST(FixedFace, LeavesRigidBodiesAlone) {
 /// One body at a node of the left wall (not in a corner of two walls).
 struct WallNode {
   NodePatch<2> node;
-  FaceConditions<2> faces;
   ContactSettings<2> settings;
-  WallContact<2> wall;
 
   WallNode(const NodeBody<2>& body, double mu, Release release = Release::reaction, V velocity = V(0, 0),
-           ContactLaw law = ContactLaw::friction, int side = 0)
+           ContactLaw law = ContactLaw::friction, int side = 0, GapRule gap = GapRule::pressure)
       : node({body}, side == 0 ? 0 : 8) {
+    FaceConditions<2> faces;
     faces[side].type = FaceType::wall, faces[side].velocity = velocity, faces[side].friction = {{law, mu}};
     ContactOptions options;
-    options.release = release;
-    std::array<FaceType, 6> types{};
-    types[side] = FaceType::wall;
-    settings = node.settings(options, 1, types);
+    options.release = release, options.gap = gap;
+    settings = node.settings(options, 1, faces);
   }
-  void first() {
-    node.sweep.find(node.patch, node.lattice, settings, node.bodies);
-    wall.find(node.patch, node.lattice, faces, settings, node.bodies);
-    wall.first_pass(node.patch, faces, settings, node.dt);
-  }
-  void second() { wall.second_pass(node.patch, faces, settings, node.dt, false); }
-  void repeat() { wall.repeat_pass(node.patch, faces, settings, node.dt); }
+  void first() { node.first(settings); }
+  void second() { node.second(settings); }
+  void repeat() { node.repeat(settings); }
 };
 
 NodeBody<2> sliding(V momentum, V force = V(0, 0)) {
   NodeBody<2> body;
   body.mass = 2, body.momentum = momentum, body.force = force;
+  body.gradient = V(-1, 0);  // it lies above the lower wall
   return body;
 }
 
@@ -347,42 +341,70 @@ TEST(Wall, StickTakesTheWallsVelocity) {
   expect_vector(w.node.projected(0), V(1, 0));
 }
 
-TEST(Wall, ReactionHoldsOnlyWhatTouches) {
-  auto body = sliding(V(-3, 4), V(-100, 0));
-  body.volume = 0.39;  // with a gradient of 1 a layer 0.11 cells off the wall; 0.106 is the largest gap
-  WallNode apart(body, 0.3);
-  apart.first();
+/// A layer 0.11 cells off the wall, that comes to it at 1.5 m/s and is pressed by a force.
+WallNode layer_near_wall(double volume, double force, GapRule gap) {
+  auto body = sliding(V(-3, 4), V(force, 0));
+  body.volume = volume;  // with a gradient of 1
+  WallNode w(body, 0.3, Release::reaction, V(0, 0), ContactLaw::friction, 0, gap);
+  w.first();
+  return w;
+}
+
+TEST(Wall, StandOffHoldsOnlyWhatTouches) {
+  WallNode apart = layer_near_wall(0.39, -100, GapRule::fill);  // 0.106 cells is the largest gap
   apart.second();
   expect_vector(apart.node.momentum(0), V(-3, 4));
   expect_vector(apart.node.force(0), V(-100, 0));
-  body.volume = 0.41;
-  WallNode near(body, 0.3);
-  near.first();
+  WallNode near = layer_near_wall(0.41, -100, GapRule::fill);
   expect_vector(near.node.momentum(0), V(0, 4));
   near.repeat();
   expect_vector(near.node.projected(0), V(0, 4));
 }
 
-/// The node beyond a wall does as the node on it decided.
-TEST(Wall, NodesBeyondFollowTheNodeOnTheWall) {
-  for (double force_on_wall : {-100.0, 100.0}) {
-    WallNode w(sliding(V(0, 5), V(force_on_wall, 0)), 0.3);
-    auto& nodes = w.node.patch.pieces[0].nodes;
-    NodeBox<2> wide = nodes;
-    wide.box.lower[0] = -1;
-    for (auto array : {&NodeBox<2>::sums, &NodeBox<2>::force, &NodeBox<2>::velocity, &NodeBox<2>::extras}) {
-      AlignedDoubles twice = nodes.*array;
-      twice.insert(twice.end(), (nodes.*array).begin(), (nodes.*array).end());
-      wide.*array = twice;
-    }
-    wide.force[0] = -7;  // beyond: pressed outwards in any case
-    nodes = wide;
-    w.first();
-    w.second();
-    const bool held = force_on_wall < 0;
-    EXPECT_NEAR(nodes.force[0], held ? 0 : -7, 1e-12);
-    EXPECT_NEAR(nodes.force[1], held ? -0.3 * 7 : 0, 1e-12);
+TEST(Wall, PressureMakesWhatIsApartTouch) {
+  // A unit of force allows 16 h / (2 c^2 m) = 16 / (2 x 900 x 2) cells.
+  const double closing = 0.11 / (16.0 / 3600);
+  for (double share : {0.99, 1.01}) {
+    const WallNode w = layer_near_wall(0.39, -share * closing, GapRule::pressure);
+    expect_vector(w.node.momentum(0), share < 1 ? V(-3, 4) : V(0, 4));
   }
+  expect_vector(layer_near_wall(0.485, -1e-3, GapRule::pressure).node.momentum(0),
+                V(0, 4));                                                                    // 0.015 cells: in any case
+  expect_vector(layer_near_wall(0.26, -1e6, GapRule::pressure).node.momentum(0), V(-3, 4));  // 0.24 cells: never
+}
+
+TEST(Wall, WhatLiesBeyondTouches) {
+  auto body = sliding(V(-3, 4));
+  body.volume = 0.1, body.gradient = V(0.4, 0);  // points back into the domain
+  WallNode w(body, 0.3);
+  w.first();
+  expect_vector(w.node.momentum(0), V(0, 4));
+}
+
+/// A node beyond a wall takes the gap of the node on it and decides by its own motion and force.
+TEST(Wall, NodesBeyondDecideForThemselves) {
+  for (double beyond : {-7.0, 7.0})
+    for (double volume : {0.5, 0.2}) {  // of the body at the node on the wall: it touches, or does not
+      auto body = sliding(V(0, 5), V(100, 0));
+      body.volume = volume;
+      WallNode w(body, 0.3);
+      auto& nodes = w.node.patch.pieces[0].nodes;
+      NodeBox<2> wide = nodes;
+      wide.box.lower[0] = -1;
+      for (auto array : {&NodeBox<2>::sums, &NodeBox<2>::force, &NodeBox<2>::velocity, &NodeBox<2>::extras}) {
+        AlignedDoubles twice = nodes.*array;
+        twice.insert(twice.end(), (nodes.*array).begin(), (nodes.*array).end());
+        wide.*array = twice;
+      }
+      wide.force[0] = beyond;
+      nodes = wide;
+      w.first();
+      w.second();
+      const bool held = beyond < 0 && volume == 0.5;
+      EXPECT_NEAR(nodes.force[0], held ? 0 : beyond, 1e-12);
+      EXPECT_NEAR(nodes.force[1], held ? -0.3 * 7 : 0, 1e-12);
+      EXPECT_EQ(nodes.force[vector_width], 100);  // pulled off
+    }
 }
 
 }  // namespace

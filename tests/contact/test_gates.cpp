@@ -12,8 +12,10 @@ using namespace test;
 using V = Vec<2>;
 
 bool acts(const std::vector<NodeBody<2>>& list, const ContactOptions& options, int at = 3,
-          const std::array<FaceType, 6>& faces = {}) {
+          const std::array<FaceType, 4>& types = {}) {
   NodePatch<2> node(list, at);
+  FaceConditions<2> faces;
+  for (int f = 0; f < 4; ++f) faces[f].type = types[f], faces[f].friction = {{ContactLaw::frictionless, 0}};
   node.first(node.settings(options, 1, faces));
   return node.momentum(0) != list[0].momentum;
 }
@@ -46,7 +48,7 @@ TEST(ContactGates, PlaceOfASurfaceFromVolumeAndGradient) {
 TEST(ContactGates, BodiesTouchAcrossSmallGapsHoweverThinTheyAre) {
   ContactOptions options = options_of(ContactLaw::friction);
   options.fill = 0.8;
-  const double largest = contact::largest_gap(0.8);
+  const double largest = contact::TouchingGap::make(options, false).most;
   EXPECT_NEAR(largest - largest * largest / 2, 0.2, 1e-15);  // what the gap leaves empty, the node on a surface
   auto list = meeting_pair();
   const auto apart = [&](double gap, double node, double thickness, double share = 1) {

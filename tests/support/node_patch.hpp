@@ -24,7 +24,7 @@ struct NodeBody {
 template <int Dim>
 struct NodePatch {
   static constexpr double dt = 0.01;
-  static constexpr double modulus = 1e6;  // [Pa]
+  static constexpr double modulus = 1e6, wave_speed = 30;  // [Pa], [m/s]
   Lattice<Dim> lattice;
   Patch<Dim> patch;
   std::vector<Body> bodies;
@@ -64,8 +64,8 @@ struct NodePatch {
     }
   }
   ContactSettings<Dim> settings(const ContactOptions& options, int materials = 1,
-                                const std::array<FaceType, 6>& faces = {}) const {
-    return ContactSettings<Dim>::make(options, std::vector<ContactMaterial>(materials, {modulus}), faces);
+                                const FaceConditions<Dim>& faces = {}) const {
+    return ContactSettings<Dim>::make(options, std::vector<ContactMaterial>(materials, {modulus, wave_speed}), faces);
   }
   double mass(int b) const { return patch.pieces[b].nodes.sums[NodeSums<Dim>::mass]; }
   Vec<Dim> momentum(int b) const {
@@ -104,7 +104,7 @@ NodeBody<Dim> random_body(Random& random) {
 inline ContactOptions options_of(ContactLaw law, Release release = Release::reaction, double mu = 0.3) {
   ContactOptions options;
   options.law = law, options.release = release, options.friction = mu;
-  options.fill = 0;
+  options.gap = GapRule::fill, options.fill = 0;
   return options;
 }
 

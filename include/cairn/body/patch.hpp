@@ -13,12 +13,28 @@ namespace cairn {
 /// Sums over a patch's points and the nodes that it answers for, since the start.
 struct PatchLedger {
   double contact_dissipation = 0;  // [J]
+  double contact_gain = 0;         // of that, what contact gave at nodes where it gave energy [J]; 0 but for round-off
   double boundary_work = 0;        // done by faces, walls and rigid bodies on deformable ones [J]
   // Taken from velocities by blending with PIC, and what spins had at the start and were given by the nodes [J]. Less
   // what spins have now, it is what was lost: by blending, by relaxing spins, and as their inertia changes.
   double blended_and_spun = 0;
-  std::int64_t contact_nodes = 0;  // nodes with a contact impulse in the last step
+  double filtered = 0;       // taken by the filter of noise, from velocities and spins [J]
+  double stopped = 0;        // times that a point was kept from crossing a wall
+  double contact_nodes = 0;  // nodes with a contact impulse in the last step
 };
+
+/// One number of the ledger, under the name that it has in files. What moves or keeps a patch goes through this table.
+struct LedgerColumn {
+  const char* name;
+  double PatchLedger::*value;
+};
+inline constexpr LedgerColumn ledger_columns[] = {{"contact_dissipation", &PatchLedger::contact_dissipation},
+                                                  {"contact_gain", &PatchLedger::contact_gain},
+                                                  {"boundary_work", &PatchLedger::boundary_work},
+                                                  {"blended_and_spun", &PatchLedger::blended_and_spun},
+                                                  {"filtered", &PatchLedger::filtered},
+                                                  {"stopped", &PatchLedger::stopped},
+                                                  {"contact_nodes", &PatchLedger::contact_nodes}};
 
 /// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared.
 template <int Dim>

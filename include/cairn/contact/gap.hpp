@@ -1,5 +1,6 @@
 #pragma once
-/// The gap between bodies at a node, from the volume and the gradient of volume that each has there.
+/// The gap between bodies at a node, from the volume and the gradient of volume that each has there, and the gap at
+/// which they count as touching.
 ///
 /// A flat layer that covers the interval from s to s + t cells off the node has, under linear hats (to which GIMP's
 /// sums over points without gaps amount), the volume v and the gradient g,
@@ -13,6 +14,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cairn/core/options.hpp"
+
 namespace cairn::contact {
 
 /// Distance [cells] from a node to the near surface of a body with the volume v > 0 there and a gradient of size g, in
@@ -23,16 +26,31 @@ inline double distance_to_surface(double v, double g) {
   return -std::max(0.0, thickness - g) / 2;
 }
 
-/// Largest gap [cells] at which bodies touch: what leaves the share `fill` of a node on one of their surfaces filled.
-/// None for 0: they touch wherever they share a node.
-inline double largest_gap(double fill) {
-  if (!(fill > 0)) return std::numeric_limits<double>::infinity();
-  return 1 - std::sqrt(std::max(0.0, 2 * fill - 1));
-}
+/// Gaps [cells] at which bodies touch: up to `least` in any case, up to `most` where forces press them.
+///
+/// What nothing presses touches at its true surface. What is pressed is strained, and its points do not show the
+/// surface to better than that strain: held only at its measured surface it would chatter. The gap that a normal force
+/// F closes in the time tau = 4 h/c that a wave needs for four cells, F tau^2/2m for each of the two bodies, is a fixed
+/// multiple of that strain, whatever the time step.
+struct TouchingGap {
+  double least = 0, most = 0;
 
-/// The same at a wall, where half of a node's room is there to be filled.
-inline double largest_gap_at_wall(double fill) {
-  return fill > 0 ? 1 - std::sqrt(fill) : std::numeric_limits<double>::infinity();
-}
+  /// Share of the gap that a unit of force allows a body of mass m at the node and wave speed c [1/N].
+  static double yield(double spacing, double wave_speed, double mass) {
+    constexpr double cells = 4;
+    return wave_speed > 0 ? cells * cells * spacing / (2 * wave_speed * wave_speed * mass) : 0.0;
+  }
+  /// \param by_force sum of F yield over the two bodies [cells]
+  bool touches(double gap, double by_force) const { return gap <= std::clamp(by_force, least, most); }
+
+  /// An explicit stand-off leaves the share `fill` of a node on one of the surfaces filled; 0: wherever a node is
+  /// shared. At a wall half of the node's room is there to be filled.
+  static TouchingGap make(const ContactOptions& options, bool at_wall) {
+    if (options.gap == GapRule::pressure) return {0.02, 0.23};
+    if (!(options.fill > 0)) return {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    const double gap = 1 - std::sqrt(at_wall ? options.fill : std::max(0.0, 2 * options.fill - 1));
+    return {gap, gap};
+  }
+};
 
 }  // namespace cairn::contact

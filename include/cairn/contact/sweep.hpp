@@ -1,70 +1,55 @@
 #pragma once
-/// Contact of the bodies in one patch: one sweep finds the nodes that bodies share, then each pass visits those alone.
-/// No neighbour search, no iteration, work linear in the nodes touched (Bardenhagen, Brackbill & Sulsky 2000, section
-/// 3).
+/// Contact in one patch, between bodies and with walls: one sweep finds the nodes where something may touch, then each
+/// pass visits those alone. No neighbour search, work linear in the nodes touched (Bardenhagen, Brackbill & Sulsky
+/// 2000, section 3).
 ///
-/// With common normals a node has one partner body, the rigid one or else the heaviest; every other body meets the rest
-/// of the node and the partner takes the opposite of their impulses, so that the impulses sum to zero for any number of
-/// bodies. With own normals each body meets the rest of the node along its own normal, as the papers print it.
+/// A node holds pairs. Every body at it forms one with the partner (the rigid body there, or else the heaviest), and
+/// one with each wall on which or beyond which the node lies: a rigid partner with a known normal. What holds is
+/// brought to rest with the least change of kinetic energy, all pairs at once; impulses of a pair are equal and
+/// opposite.
 
-#include "cairn/body/patch.hpp"
 #include "cairn/contact/course.hpp"
-#include "cairn/contact/gap.hpp"
 #include "cairn/contact/laws.hpp"
 #include "cairn/contact/ledger.hpp"
+#include "cairn/contact/settings.hpp"
 
 namespace cairn {
 
-/// What contact needs to know of a material.
-struct ContactMaterial {
-  double longitudinal_modulus = 0;  // K + 4G/3 [Pa]
-};
-
-/// Law and friction between two materials.
-struct PairLaw {
-  ContactLaw law = ContactLaw::friction;
-  double friction = 0;
-};
-
-/// Contact settings of a run.
-template <int Dim>
-struct ContactSettings {
-  ContactOptions options;
-  std::vector<ContactMaterial> materials;
-  std::vector<PairLaw> pairs;  // materials x materials, then one row for walls
-  std::array<FaceType, 6> faces{};
-  bool keep_contacts = false;  // sum what passes between pairs, for output
-  // Rigid bodies turn along chords (contact/course.hpp), not tangents. Chords strain what sticks to them by t^2/2 in
-  // and out: for steps that take the strain at their start and at their end, as "both" does, so that the two cancel.
-  bool chords = true;
-
-  static ContactSettings make(const ContactOptions& options, std::vector<ContactMaterial> materials,
-                              const std::array<FaceType, 6>& faces);
-  /// Distance [cells] from a node to a body's near surface, from its NodeSums there (contact/gap.hpp). \param room
-  /// [m^Dim] that bodies around the node have: a cell, less where walls take a part.
-  double distance(const double* sums, const Lattice<Dim>& lattice, double room) const;
-  const PairLaw& pair(int a, int b) const { return pairs[static_cast<std::size_t>(a) * materials.size() + b]; }
-};
-
-/// One body at a node shared by several.
+/// One body at a node of contact.
 template <int Dim>
 struct ContactEntry {
   int piece = 0, node = 0;  // position in the patch's pieces, offset in the piece's box
+  int material = 0;
   double mass = 0;
   bool rigid = false;
-  int turning = -1;   // a rigid body that turns: its position in ContactSweep::turning_
-  bool open = false;  // contact is possible (not: too little there, too far apart, no normal)
-  contact::Decision decision;
-  bool compressive = false, stress_free = false;
-  PairLaw law;
-  Vec<Dim> normal = Vec<Dim>::Zero();  // out of the body
+  int turning = -1;  // a rigid body that turns: its position in ContactSweep::turning_
   contact::NodeRecord<Dim> record;
+};
+
+/// Two that may touch at a node.
+template <int Dim>
+struct NodePair {
+  static constexpr int none = -1;
+  int a = 0, b = none;  // entries, counted from the node's first; b is none for walls (and for all with own normals)
+  int face = none;      // of a wall
+  PairLaw law;
+  Vec<Dim> normal = Vec<Dim>::Zero();  // out of a
+  bool open = false;                   // contact is possible (not: too little mass there, no normal, a fixed face)
+  double gap = 0;                      // [cells]
+  double yield = 0;                    // what a unit of force adds to the gap that counts as touching [cells/N]
+  int gap_node = 0;                    // at a wall: offset of the node on it, which answers for those beyond
+  bool compressive = false, stress_free = false;
+  contact::Decision decision;
+  Vec<Dim> slip = Vec<Dim>::Zero();     // tangential excess momentum at the start of the step
+  Vec<Dim> impulse = Vec<Dim>::Zero();  // on a, in the pass under way
+  Vec<Dim> second = Vec<Dim>::Zero();   // on a, of the pass whose impulses reach the points
 };
 
 template <int Dim>
 class ContactSweep {
  public:
-  /// Finds the shared nodes of the patch from complete sums, with normals, partners and gates. Replaces what was there.
+  /// Finds the nodes of the patch where something may touch, from complete sums, with pairs, normals and gates.
+  /// Replaces what was there.
   void find(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
             const std::vector<Body>& bodies);
 
@@ -78,39 +63,75 @@ class ContactSweep {
   void repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
 
  private:
-  struct SharedNode {
-    int first, count, partner;  // entries; position of the partner among them
+  struct Node {
+    int first, count;            // entries
+    int first_pair, pair_count;  // pairs
+    int partner;                 // position of the partner among the entries
     Index<Dim> place;
     double share;  // in the ledger: 0 where another patch answers for it, half on a symmetry plane
   };
   enum class Pass { first, second, repeat };
+  /// How a pair acts while a node is solved.
+  enum class Mode { off, slide, stick, bound };
 
+  // find_contacts.cpp
   void count_bodies(const Patch<Dim>& patch);
-  void list_entries(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings,
-                    const std::vector<Body>& bodies);
-  void prepare(SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
-               const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
-  void set_gaps(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
-                const ContactSettings<Dim>& settings, double room);
-  void set_normals(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice, NormalChoice choice);
-  void set_gates(const SharedNode& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
-                 const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
-  Vec<Dim> impulse(ContactEntry<Dim>& entry, const Vec<Dim>& P, const Vec<Dim>& F, const ContactSettings<Dim>& settings,
-                   double dt, Pass pass) const;
-  /// Impulses on all bodies of a node, from the momenta and forces in momenta_ and forces_; result in impulses_.
-  void resolve(const SharedNode& node, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt,
-               Pass pass);
-  void load_node(const SharedNode& node, const Patch<Dim>& patch, Pass pass, double dt);
-  void keep_pairs(const SharedNode& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
-  void keep_ledger(const SharedNode& node, Patch<Dim>& patch, double dt, bool projected_again) const;
+  void list_nodes(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings);
+  void list_entries(const Patch<Dim>& patch, const ContactSettings<Dim>& settings, const std::vector<Body>& bodies);
+  void list_pairs(Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                  const ContactSettings<Dim>& settings);
+  void add_wall_pairs(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                      const ContactSettings<Dim>& settings);
+  void set_normals(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                   const ContactSettings<Dim>& settings);
+  void set_gaps(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                const ContactSettings<Dim>& settings);
+  void set_gates(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                 const ContactSettings<Dim>& settings);
+
+  // solve_node.cpp: the impulses of all pairs of a node, from momenta_ and forces_; their sums on the bodies in
+  // impulses_
+  void solve(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+             const ContactSettings<Dim>& settings, double dt, Pass pass);
+  void decide(const Node& node, const Patch<Dim>& patch, const ContactSettings<Dim>& settings, double dt);
+  void solve_pair(const Node& node, NodePair<Dim>& pair, Pass pass);
+  void solve_together(const Node& node, Pass pass);
+  void bring_to_rest(const Node& node);
+  bool release_pairs(const Node& node);
+  void add_friction(const Node& node);
+  void solve_as_published(const Node& node, const ContactSettings<Dim>& settings, double dt, Pass pass);
+  void give(const NodePair<Dim>& pair, const Vec<Dim>& impulse);
+  void take_back(const Node& node, double dt);
+  double given(const Node& node, double dt, bool again) const;
+  double driven(const Node& node) const;
+  double inverse_mass(const Node& node, int entry) const;
+  double reduced_mass(const Node& node, const NodePair<Dim>& pair) const;
+  Vec<Dim> relative_velocity(const Node& node, const NodePair<Dim>& pair) const;
+  Vec<Dim> relative_acceleration(const Node& node, const NodePair<Dim>& pair) const;
+
+  // sweep.cpp
+  void load_node(const Node& node, const Patch<Dim>& patch, Pass pass, double dt);
+  void keep_contacts(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
+  void keep_ledger(const Node& node, Patch<Dim>& patch, double dt, bool projected_again) const;
 
   Box<Dim> box_;
-  std::vector<std::int32_t> bodies_at_;  // bodies at each node of the patch; later the node's place in shared_
-  std::vector<SharedNode> shared_;
+  std::vector<std::int32_t> bodies_at_;  // bodies at each node of the box; later the node's place in nodes_
+  std::vector<Node> nodes_;
   std::vector<ContactEntry<Dim>> entries_;
-  std::vector<Body> turning_;                          // the rigid bodies among them that turn
-  std::vector<Vec<Dim>> momenta_, forces_, impulses_;  // of the node in hand
-  std::vector<double> distances_;                      // likewise: from the node to the bodies' surfaces [cells]
+  std::vector<NodePair<Dim>> pairs_;
+  std::vector<Body> turning_;  // the rigid bodies among them that turn
+  std::array<Vec<Dim>, 2 * Dim> wall_velocities_;
+  // Of the node in hand:
+  std::vector<Vec<Dim>> momenta_, forces_, impulses_;
+  std::vector<double> distances_;  // from the node to the bodies' surfaces [cells]
+  std::vector<Mode> modes_;
+  struct Row {
+    int pair;
+    Vec<Dim> along;
+  };
+  std::vector<Row> rows_;
+  Eigen::MatrixXd matrix_;
+  Eigen::VectorXd right_;
 };
 
 }  // namespace cairn

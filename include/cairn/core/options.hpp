@@ -10,6 +10,8 @@ enum class ShapeFunction { linear, gimp, bspline2 };
 enum class StressUpdate { last, first, both, modified_last };
 enum class ContactLaw { none, stick, frictionless, friction };
 enum class Release { approach, traction, reaction };
+/// What decides how far apart bodies touch: the pressure between them, or a stand-off (ContactOptions::fill).
+enum class GapRule { pressure, fill };
 enum class NormalSource { density, mass_gradient, volume_gradient };
 enum class NormalChoice { common, own };
 enum class Gate { node, body };
@@ -19,6 +21,8 @@ enum class Passes { both, before, after };
 enum class Plane { strain, stress };
 /// Volumes of points at the surface of round bodies: all the same, or what of the body they stand for.
 enum class Surface { whole, cut };
+/// How much of the points' motion that no node sees is taken away (src/solver/noise_filter.cpp).
+enum class NoiseFilter { off, weak, strong, xpic };
 enum class FaceType { free, fixed, symmetry, wall, periodic };
 
 /// How patches are dealt to ranks; never changes a result.
@@ -37,6 +41,8 @@ struct SolverOptions {
   bool spin = true;         // points carry an angular velocity
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
   Surface surface = Surface::whole;
+  NoiseFilter noise_filter = NoiseFilter::weak;
+  int noise_order = 4;      // times that motion goes to the nodes and back before what is left counts as noise
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };
 
@@ -51,7 +57,8 @@ struct ContactOptions {
   ContactLaw law = ContactLaw::friction;
   Release release = Release::reaction;
   double friction = 0.3;  // may be infinite
-  double fill = 0.8;
+  GapRule gap = GapRule::pressure;
+  double fill = 0.8;  // share of a node that the stand-off leaves filled; for GapRule::fill
   double impulse_limit = 0.0;  // gamma of Bardenhagen et al. 2001, eq. 21; 0: off
   NormalSource normals = NormalSource::volume_gradient;
   NormalChoice normal_choice = NormalChoice::common;

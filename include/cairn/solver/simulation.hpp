@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "cairn/boundary/faces.hpp"
+#include "cairn/contact/sweep.hpp"
 #include "cairn/io/case.hpp"
 #include "cairn/parallel/migration.hpp"
 #include "cairn/parallel/node_exchange.hpp"
@@ -30,11 +31,15 @@ struct Totals {
   double viscous = 0;                                          // [J], dissipated in the material; likewise
   double contact_dissipation = 0, boundary_work = 0;           // [J], since the start
   double numerical = 0;                                        // [J], lost by blending with PIC and in spins
+  double filtered = 0;                                         // [J], taken by the filter of noise
+  double contact_gain = 0;                                     // [J], given by contact where it gave
+  double stopped = 0;                                          // points kept from crossing a wall, since the start
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0;                                             // [kg]
   double contact_nodes = 0;
   double energy() const {
-    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical - boundary_work;
+    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical + filtered -
+           boundary_work;
   }
 };
 
@@ -113,6 +118,7 @@ class Simulation {
   // The stages of a step, in order. All but the first and the last are those of one patch, the p-th of this rank;
   // (*) begins with the sums over patches that the exchange before it brought.
   void choose_time_step(double longest);
+  void filter_noise();                                           // communicates, every so many steps
   void project_points(Patch<Dim>& patch);                        // of pieces that `finish_points` could not
   void contact_before_update(std::size_t p, Patch<Dim>& patch);  // (*)
   void strain_first(Patch<Dim>& patch, double share);
@@ -196,14 +202,12 @@ class Simulation {
   Lattice<Dim> lattice_;
   TransferSettings<Dim> transfer_, transfer_of_turning_;
   ContactSettings<Dim> contact_;
-  FaceConditions<Dim> faces_;
   std::vector<SolverMaterial> materials_;
   std::vector<Body> bodies_;
   std::vector<Patch<Dim>> patches_;
   std::vector<int> owner_;
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
   std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
-  std::vector<WallContact<Dim>> walls_;
   std::unique_ptr<NeighbourExchange> messages_;
   std::unique_ptr<NodeExchange<Dim>> exchange_;
   std::unique_ptr<Migration<Dim>> migration_;

@@ -15,9 +15,9 @@ inline double processor_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-enum class Stage { project, exchange, contact, stress, integrate, update, migrate, output, count };
+enum class Stage { filter, project, exchange, contact, stress, integrate, update, migrate, output, count };
 inline constexpr std::array<const char*, static_cast<std::size_t>(Stage::count)> stage_names = {
-    "project", "exchange", "contact", "stress", "integrate", "update", "migrate", "output"};
+    "filter", "project", "exchange", "contact", "stress", "integrate", "update", "migrate", "output"};
 
 class StageTimers {
  public:

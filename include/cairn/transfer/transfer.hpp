@@ -29,6 +29,7 @@ struct TransferSettings {
   double spin_relaxation = 0.03;
   NormalSettings normals;
   std::array<std::array<bool, 2>, Dim> mirrored{};  // sides that are symmetry planes
+  std::array<std::array<bool, 2>, Dim> walled{};    // sides that are walls, which no point crosses
   bool extras = false;                              // stress and position sums are needed
   bool normals_needed = true;
 
@@ -38,6 +39,7 @@ struct TransferSettings {
 /// Highest speeds met, for the time step [m/s]; infinite where a point is inverted or not finite.
 struct SpeedLimits {
   double wave = 0, point = 0;
+  std::int64_t stopped = 0;  // times that a point was kept from crossing a wall
 };
 
 /// Sets the node box of a piece to what its points touch. Comes before `project`.
@@ -106,6 +108,11 @@ void velocity_from_momentum(Piece<Dim>& piece);
 /// keep their angular momentum to second order in dt.
 template <int Dim>
 void centre_motion(Piece<Dim>& piece);
+/// nodes -> points: velocities and spins less what NodeBox::velocity [m/s] shows of them, the adjoint of how they gave
+/// it momentum: v -= sum N u, w -= sum N arm x u / sum N arm^2.
+template <int Dim>
+void subtract_seen(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings);
+
 /// nodes: velocity = that of the motion, after the momentum update.
 template <int Dim>
 void velocity_from_motion(Piece<Dim>& piece);

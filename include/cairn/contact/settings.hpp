@@ -1,0 +1,66 @@
+#pragma once
+/// What contact needs to know of materials, pairs of them and the faces of the domain.
+
+#include "cairn/body/patch.hpp"
+#include "cairn/contact/gap.hpp"
+
+namespace cairn {
+
+/// What contact needs to know of a material.
+struct ContactMaterial {
+  double longitudinal_modulus = 0;  // K + 4G/3 [Pa]
+  double wave_speed = 0;            // of longitudinal waves at the start [m/s]; 0: it does not yield
+};
+
+/// Law and friction between two materials.
+struct PairLaw {
+  ContactLaw law = ContactLaw::friction;
+  double friction = 0;
+  /// Binds bodies in all directions, without touching or releasing.
+  bool binds() const { return law == ContactLaw::none || law == ContactLaw::stick; }
+};
+
+template <int Dim>
+struct FaceCondition {
+  FaceType type = FaceType::free;
+  Vec<Dim> velocity = Vec<Dim>::Zero();  // of a fixed face or wall [m/s]
+  std::vector<PairLaw> friction;         // of a wall, for each material
+};
+
+/// All faces, two for each direction (lower, upper); empty types in periodic directions.
+template <int Dim>
+using FaceConditions = std::array<FaceCondition<Dim>, 2 * Dim>;
+
+/// Whether a node lies on a face of the domain or beyond it; face = 2 x direction + side.
+template <int Dim>
+bool at_face(const Index<Dim>& place, int face, const Lattice<Dim>& lattice) {
+  const int d = face / 2;
+  return !lattice.periodic(d) && (face % 2 == 0 ? place[d] <= 0 : place[d] >= lattice.cells()[d]);
+}
+
+/// Contact settings of a run.
+template <int Dim>
+struct ContactSettings {
+  ContactOptions options;
+  std::vector<ContactMaterial> materials;
+  std::vector<PairLaw> pairs;  // materials x materials
+  FaceConditions<Dim> faces{};
+  contact::TouchingGap gap, gap_at_wall;
+  bool keep_contacts = false;  // sum what passes between pairs, for output
+  // Rigid bodies turn along chords (contact/course.hpp), not tangents. Chords strain what sticks to them by t^2/2 in
+  // and out: for steps that take the strain at their start and at their end, as "both" does, so that the two cancel.
+  bool chords = true;
+
+  static ContactSettings make(const ContactOptions& options, std::vector<ContactMaterial> materials,
+                              const FaceConditions<Dim>& faces);
+  /// Volume that bodies around a node have [m^Dim]: a cell, less where walls and fixed faces take a part.
+  double room(const Index<Dim>& place, const Lattice<Dim>& lattice) const;
+  /// Size of a body's gradient of volume at a node in cells of size 1, from its NodeSums there; that of mass is divided
+  /// by the density.
+  double gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const;
+  /// Distance [cells] from a node to a body's near surface, from its NodeSums there (contact/gap.hpp).
+  double distance(const double* sums, const Lattice<Dim>& lattice, double room) const;
+  const PairLaw& pair(int a, int b) const { return pairs[static_cast<std::size_t>(a) * materials.size() + b]; }
+};
+
+}  // namespace cairn

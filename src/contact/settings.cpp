@@ -1,0 +1,53 @@
+#include "cairn/contact/settings.hpp"
+
+namespace cairn {
+
+template <int Dim>
+ContactSettings<Dim> ContactSettings<Dim>::make(const ContactOptions& options, std::vector<ContactMaterial> materials,
+                                                const FaceConditions<Dim>& faces) {
+  ContactSettings s;
+  s.options = options;
+  s.materials = std::move(materials);
+  const std::size_t n = s.materials.size();
+  const auto friction_of = [](ContactLaw law, double mu) { return law == ContactLaw::frictionless ? 0.0 : mu; };
+  s.pairs.assign(n * n, {options.law, friction_of(options.law, options.friction)});
+  for (const auto& pair : options.pairs) {
+    if (pair.material_a < 0 || pair.material_b < 0) continue;
+    const PairLaw law{pair.law, friction_of(pair.law, pair.friction)};
+    s.pairs[pair.material_a * n + pair.material_b] = s.pairs[pair.material_b * n + pair.material_a] = law;
+  }
+  s.faces = faces;
+  s.gap = contact::TouchingGap::make(options, false);
+  s.gap_at_wall = contact::TouchingGap::make(options, true);
+  return s;
+}
+
+template <int Dim>
+double ContactSettings<Dim>::room(const Index<Dim>& place, const Lattice<Dim>& lattice) const {
+  double room = lattice.cell_volume();
+  for (int face = 0; face < 2 * Dim; ++face) {
+    const FaceType type = faces[face].type;
+    if ((type == FaceType::fixed || type == FaceType::wall) && at_face<Dim>(place, face, lattice)) room *= 0.5;
+  }
+  return room;
+}
+
+template <int Dim>
+double ContactSettings<Dim>::gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const {
+  using N = NodeSums<Dim>;
+  const Eigen::Map<const Vec<Dim>> gradient(sums + N::gradient);
+  const double size = gradient.cwiseProduct(lattice.spacing()).norm() / room;
+  return options.normals == NormalSource::volume_gradient ? size : size * sums[N::volume] / sums[N::mass];
+}
+
+template <int Dim>
+double ContactSettings<Dim>::distance(const double* sums, const Lattice<Dim>& lattice, double room) const {
+  const double volume = sums[NodeSums<Dim>::volume] / room;
+  if (!(volume > 0)) return std::numeric_limits<double>::infinity();
+  return contact::distance_to_surface(volume, gradient_share(sums, lattice, room));
+}
+
+template struct ContactSettings<2>;
+template struct ContactSettings<3>;
+
+}  // namespace cairn
