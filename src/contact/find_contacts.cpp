@@ -167,7 +167,7 @@ void ContactSweep<Dim>::add_wall_pairs(const Node& node, const Patch<Dim>& patch
       // A wall leaves a body half of a node's room: twice that is the room of which contact/gap.hpp speaks. What lies
       // beyond the wall has a gradient that points back in: its size would read as a gap on this side.
       const bool beyond = pair.normal.dot(ConstNode<Dim>(sums + N::gradient)) < 0;
-      pair.gap = beyond ? 0.0 : settings.distance(sums, lattice, 2 * settings.room(on_wall, lattice));
+      pair.gap = beyond ? 0.0 : settings.distance(sums, pair.normal, lattice, 2 * settings.room(on_wall, lattice));
       pair.yield = contact::TouchingGap::yield(lattice.smallest_spacing(),
                                                settings.materials[entry.material].wave_speed, sums[N::mass]);
       pairs_.push_back(pair);
@@ -188,7 +188,7 @@ void ContactSweep<Dim>::set_normals(const Node& node, const Patch<Dim>& patch, c
     const double* sums = sums_at(patch.pieces[entry[i].piece], entry[i].node);
     const double volume = sums[NodeSums<Dim>::volume] / lattice.cell_volume();
     const double flat = std::sqrt(2 * std::clamp(std::min(volume, 1 - volume), 0.0, 0.5));
-    const double size = settings.gradient_share(sums, lattice, lattice.cell_volume());
+    const double size = settings.gradient_share(sums, lattice, lattice.cell_volume()).norm();
     return size < 0.1 ? size : size / (flat + 0.02);
   };
   const double of_partner = flatness(node.partner);
@@ -211,9 +211,9 @@ void ContactSweep<Dim>::set_gaps(const Node& node, const Patch<Dim>& patch, cons
   if (settings.options.release != Release::reaction) return;
   const auto* entry = &entries_[node.first];
   const double room = settings.room(node.place, lattice);
-  distances_.resize(node.count);
-  for (int i = 0; i < node.count; ++i)
-    distances_[i] = settings.distance(sums_at(patch.pieces[entry[i].piece], entry[i].node), lattice, room);
+  const auto distance = [&](int i, const Vec<Dim>& normal) {
+    return settings.distance(sums_at(patch.pieces[entry[i].piece], entry[i].node), normal, lattice, room);
+  };
   const auto yield = [&](int i) {
     const double speed = entry[i].rigid ? 0.0 : settings.materials[entry[i].material].wave_speed;
     return contact::TouchingGap::yield(lattice.smallest_spacing(), speed, entry[i].mass);
@@ -222,8 +222,8 @@ void ContactSweep<Dim>::set_gaps(const Node& node, const Patch<Dim>& patch, cons
     NodePair<Dim>& pair = pairs_[p];
     double nearest = std::numeric_limits<double>::infinity();
     for (int j = 0; j < node.count; ++j)
-      if (j != pair.a) nearest = std::min(nearest, distances_[j]);
-    pair.gap = distances_[pair.a] + nearest;
+      if (j != pair.a) nearest = std::min(nearest, distance(j, pair.normal));
+    pair.gap = distance(pair.a, pair.normal) + nearest;
     pair.yield = yield(pair.a) + yield(node.partner);
   }
 }

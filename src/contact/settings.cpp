@@ -33,18 +33,20 @@ double ContactSettings<Dim>::room(const Index<Dim>& place, const Lattice<Dim>& l
 }
 
 template <int Dim>
-double ContactSettings<Dim>::gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const {
+Vec<Dim> ContactSettings<Dim>::gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const {
   using N = NodeSums<Dim>;
-  const Eigen::Map<const Vec<Dim>> gradient(sums + N::gradient);
-  const double size = gradient.cwiseProduct(lattice.spacing()).norm() / room;
-  return options.normals == NormalSource::volume_gradient ? size : size * sums[N::volume] / sums[N::mass];
+  const double scale = options.normals == NormalSource::volume_gradient ? 1.0 : sums[N::volume] / sums[N::mass];
+  return scale / room * Eigen::Map<const Vec<Dim>>(sums + N::gradient).cwiseProduct(lattice.spacing());
 }
 
 template <int Dim>
-double ContactSettings<Dim>::distance(const double* sums, const Lattice<Dim>& lattice, double room) const {
+double ContactSettings<Dim>::distance(const double* sums, const Vec<Dim>& normal, const Lattice<Dim>& lattice,
+                                      double room) const {
   const double volume = sums[NodeSums<Dim>::volume] / room;
   if (!(volume > 0)) return std::numeric_limits<double>::infinity();
-  return contact::distance_to_surface(volume, gradient_share(sums, lattice, room));
+  const Vec<Dim> gradient = gradient_share(sums, lattice, room);
+  const double along = gradient.dot(normal);
+  return contact::distance_beside_edge(volume, std::abs(along), (gradient - along * normal).norm());
 }
 
 template struct ContactSettings<2>;

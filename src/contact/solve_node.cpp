@@ -6,14 +6,6 @@
 #include "node_access.hpp"
 
 namespace cairn {
-namespace {
-
-template <int Dim>
-double acting_friction(const NodePair<Dim>& pair, const Vec<Dim>& P) {
-  return contact::acting_friction<Dim>(pair.law.friction, pair.decision, pair.slip, P);
-}
-
-}  // namespace
 
 template <int Dim>
 double ContactSweep<Dim>::inverse_mass(const Node& node, int entry) const {
@@ -80,7 +72,6 @@ void ContactSweep<Dim>::decide(const Node& node, const Patch<Dim>& patch, const 
     if (!pair.open || pair.law.binds()) continue;
     const double mass = reduced_mass(node, pair);
     const Vec<Dim> P = mass * relative_velocity(node, pair), F = mass * relative_acceleration(node, pair);
-    pair.slip = contact::tangential<Dim>(P, pair.normal);
     double pressing = F.dot(pair.normal);
     if (pair.face != pair.none) {
       const auto& piece = patch.pieces[entries_[node.first + pair.a].piece];
@@ -100,7 +91,7 @@ void ContactSweep<Dim>::solve_pair(const Node& node, NodePair<Dim>& pair, Pass p
   if (pair.law.binds())
     pair.impulse = -P;
   else if (pass == Pass::second)
-    pair.impulse = contact::reaction_impulse<Dim>(P, pair.normal, pair.decision, acting_friction(pair, P));
+    pair.impulse = contact::reaction_impulse<Dim>(P, pair.normal, pair.decision, pair.law.friction);
   else
     pair.impulse = contact::hold_impulse<Dim>(P, pair.normal, pair.decision);
   give(pair, pair.impulse);
@@ -184,7 +175,7 @@ void ContactSweep<Dim>::add_friction(const Node& node) {
     if (modes_[p] != Mode::slide) continue;
     NodePair<Dim>& pair = pairs[p];
     const Vec<Dim> P = reduced_mass(node, pair) * relative_velocity(node, pair);
-    const double limit = contact::friction_limit(acting_friction(pair, P), -pair.impulse.dot(pair.normal));
+    const double limit = contact::friction_limit(pair.law.friction, -pair.impulse.dot(pair.normal));
     pair.impulse += contact::limited_impulse<Dim>(P, pair.normal, 0.0, limit);
   }
   for (int i = 0; i < node.count; ++i) impulses_[i].setZero();
@@ -265,11 +256,10 @@ void ContactSweep<Dim>::solve_as_published(const Node& node, const ContactSettin
     } else if (settings.options.release == Release::reaction) {
       const Vec<Dim> F = forces_[pair.a] - (wall ? Vec<Dim>(Vec<Dim>::Zero()) : Vec<Dim>(own / mass * force));
       const auto& gap = wall ? settings.gap_at_wall : settings.gap;
-      if (pass == Pass::first) pair.slip = tangential<Dim>(P, n);
       if (pass == Pass::first)
         pair.decision =
             gap.touches(pair.gap, pair.yield * F.dot(n)) ? decide_by_reaction<Dim>(P, F, n, mu, dt) : Decision{};
-      pair.impulse = pass == Pass::second ? reaction_impulse<Dim>(P, n, pair.decision, acting_friction(pair, P))
+      pair.impulse = pass == Pass::second ? reaction_impulse<Dim>(P, n, pair.decision, pair.law.friction)
                                           : hold_impulse<Dim>(P, n, pair.decision);
     } else if (wall || settings.options.release == Release::approach) {
       // Stress at a wall is one-sided, so that release by traction reduces to approach there.

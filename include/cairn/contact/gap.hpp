@@ -26,6 +26,24 @@ inline double distance_to_surface(double v, double g) {
   return -std::max(0.0, thickness - g) / 2;
 }
 
+/// Along a given normal, for a body that may end beside the node: `along` and `across` are the sizes of its gradient's
+/// parts. What a straight edge leaves of the hat, the share c, has across/v = (1 - |x|)/c with x the edge's place, and
+/// a layer of volume v/c and gradient along/c would fill the node if it went on.
+inline double distance_beside_edge(double v, double along, double across) {
+  const double r = across / v;
+  double c = 1;
+  if (r >= 2) {
+    c = 2 / (r * r);
+  } else if (r > 1e-6) {
+    const double u = (std::sqrt(1 + 2 * r * r) - 1) / r;
+    c = 1 - u * u / 2;
+  }
+  // No less than the least share with which v and `along` belong to a layer.
+  const double least = v <= along * (1 - along / 2) ? along * along / (2 * v) : 0.0;
+  c = std::min(1.0, std::max({c, least, 0.5 * (v + std::sqrt(v * v + 2 * along * along))}));
+  return distance_to_surface(v / c, along / c);
+}
+
 /// Gaps [cells] at which bodies touch: up to `least` in any case, up to `most` where forces press them.
 ///
 /// What nothing presses touches at its true surface. What is pressed is strained, and its points do not show the
@@ -46,7 +64,7 @@ struct TouchingGap {
   /// An explicit stand-off leaves the share `fill` of a node on one of the surfaces filled; 0: wherever a node is
   /// shared. At a wall half of the node's room is there to be filled.
   static TouchingGap make(const ContactOptions& options, bool at_wall) {
-    if (options.gap == GapRule::pressure) return {0.02, 0.23};
+    if (options.gap == GapRule::pressure) return {0.03, 0.23};
     if (!(options.fill > 0)) return {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     const double gap = 1 - std::sqrt(at_wall ? options.fill : std::max(0.0, 2 * options.fill - 1));
     return {gap, gap};

@@ -62,14 +62,6 @@ Vec<Dim> reaction_impulse(const Vec<Dim>& P, const Vec<Dim>& n, const Decision& 
   return limited_impulse<Dim>(P, n, normal, friction_limit(mu, normal));
 }
 
-/// The coefficient of friction in a step that begins with the tangential excess momentum `slip` and would end with P
-/// without friction: none where forces turn the sliding round within the step. It has no direction then, and would
-/// drive bodies; it acts again in the next step.
-template <int Dim>
-double acting_friction(double mu, const Decision& decision, const Vec<Dim>& slip, const Vec<Dim>& P) {
-  return !decision.stick && slip.dot(P) < 0 ? 0.0 : mu;
-}
-
 /// Release by approach: Bardenhagen, Brackbill & Sulsky 2000, eqs. 12-23.
 template <int Dim>
 Vec<Dim> approach_impulse(const Vec<Dim>& P, const Vec<Dim>& n, double mu) {

@@ -55,11 +55,11 @@ struct ContactSettings {
                               const FaceConditions<Dim>& faces);
   /// Volume that bodies around a node have [m^Dim]: a cell, less where walls and fixed faces take a part.
   double room(const Index<Dim>& place, const Lattice<Dim>& lattice) const;
-  /// Size of a body's gradient of volume at a node in cells of size 1, from its NodeSums there; that of mass is divided
-  /// by the density.
-  double gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const;
-  /// Distance [cells] from a node to a body's near surface, from its NodeSums there (contact/gap.hpp).
-  double distance(const double* sums, const Lattice<Dim>& lattice, double room) const;
+  /// A body's gradient of volume at a node in cells of size 1, from its NodeSums there; that of mass is divided by the
+  /// density.
+  Vec<Dim> gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const;
+  /// Distance [cells] from a node to a body's near surface along the normal, from its NodeSums there (contact/gap.hpp).
+  double distance(const double* sums, const Vec<Dim>& normal, const Lattice<Dim>& lattice, double room) const;
   const PairLaw& pair(int a, int b) const { return pairs[static_cast<std::size_t>(a) * materials.size() + b]; }
 };
 

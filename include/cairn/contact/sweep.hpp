@@ -40,7 +40,6 @@ struct NodePair {
   int gap_node = 0;                    // at a wall: offset of the node on it, which answers for those beyond
   bool compressive = false, stress_free = false;
   contact::Decision decision;
-  Vec<Dim> slip = Vec<Dim>::Zero();     // tangential excess momentum at the start of the step
   Vec<Dim> impulse = Vec<Dim>::Zero();  // on a, in the pass under way
   Vec<Dim> second = Vec<Dim>::Zero();   // on a, of the pass whose impulses reach the points
 };
@@ -123,7 +122,6 @@ class ContactSweep {
   std::array<Vec<Dim>, 2 * Dim> wall_velocities_;
   // Of the node in hand:
   std::vector<Vec<Dim>> momenta_, forces_, impulses_;
-  std::vector<double> distances_;  // from the node to the bodies' surfaces [cells]
   std::vector<Mode> modes_;
   struct Row {
     int pair;
