@@ -29,9 +29,10 @@ LITERAL = {
 # Other choices of the solver.
 SETTINGS = {update: {"solver.stress_update": f'"{update}"'} for update in ("first", "modified_last", "last")} | {
     shape: {"solver.shape": f'"{shape}"'} for shape in ("linear", "bspline2")} | {
-    "cut": {"solver.surface": '"cut"'}}  # acts on round bodies only
+    # The first acts on round bodies only.
+    "whole": {"solver.surface": '"whole"'}, "stand-off": {"contact.fill": 0.8}, "no filter": {"solver.noise_filter": '"off"'}}
 FORMS = LITERAL | SETTINGS
-OF_FLAT_BODIES = tuple(form for form in FORMS if form != "cut")
+OF_FLAT_BODIES = tuple(form for form in FORMS if form != "whole")
 
 
 def nothing_drawn(_folders: Folders, _out: Path) -> list[Path]:

@@ -64,7 +64,7 @@ VARIATIONS = {
     "impulse_limit": {"contact.impulse_limit": 0.1},
     "separation": {"contact.separation": 0.8},
     "half_pic": {"solver.flip": 0.5},
-    "cut_surface": {"solver.surface": '"cut"'},
+    "whole_surface": {"solver.surface": '"whole"'},
     "nine_points": {"solver.points_per_cell": 9},
     "hypoelastic": {"materials.soft.model": '"hypoelastic"'},
     "plane_stress": {"materials.soft.plane": '"stress"'},

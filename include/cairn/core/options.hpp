@@ -40,7 +40,7 @@ struct SolverOptions {
   double flip = 1.0;        // 1: FLIP, 0: PIC
   bool spin = true;         // points carry an angular velocity
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
-  Surface surface = Surface::whole;
+  Surface surface = Surface::cut;
   NoiseFilter noise_filter = NoiseFilter::weak;
   int noise_order = 4;      // times that motion goes to the nodes and back before what is left counts as noise
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off

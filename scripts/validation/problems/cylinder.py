@@ -88,4 +88,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("cylinder", "Plate on a cylinder", "Hertz, plane strain; Johnson, Contact Mechanics, section 4.2",
-                  runs, checks, draw, literal=tuple(f"R/{cells}" for cells in CELLS), forms=("cut",))
+                  runs, checks, draw, literal=tuple(f"R/{cells}" for cells in CELLS), forms=("whole", "stand-off"))

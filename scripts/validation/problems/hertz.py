@@ -170,4 +170,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 PROBLEM = Problem("hertz", "Sphere: plate and impact", "Hertz; Johnson, Contact Mechanics, sections 4.2 and 11.4", runs,
                   checks, draw, literal=(*(f"press, R/{cells}" for cells in CELLS),
                                          *(impact_label(cells, gap) for cells in CELLS[:2] for gap in GAPS)),
-                  forms=("cut",))
+                  forms=("whole", "stand-off"))

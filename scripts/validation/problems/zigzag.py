@@ -111,4 +111,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 PROBLEM = Problem("zigzag", "Stress wave in five disks in a zig-zag",
                   "Bardenhagen et al. 2001, section 3.3, Figs. 10 and 11", runs, checks, draw,
-                  literal=(*KINDS, *(name + FINE for name in KINDS)), forms=("cut",))
+                  literal=(*KINDS, *(name + FINE for name in KINDS)), forms=("whole", "stand-off"))
