@@ -94,6 +94,20 @@ def main(scratch: Path):
     expect_difference(scratch / "a", fewer, f"grains_000000.h5: only in {scratch / 'a'}")
     (fewer / "grains_000000.h5").write_text("no HDF5")
     expect_difference(scratch / "a", fewer, "cannot be read")
+    for name, text in (("case_a", "dt = 1.0\n[parallel]\npartition = 1\n[[grains]]\nfile = 'case_grains_0.csv'\n"),
+                       ("case_b", "grains = [{ file = 'case_grains_0.csv' }]\ndt = 1.0\n[parallel]\npartition = 2\n"),
+                       ("case_c", "grains = [{ file = 'case_grains_1.csv' }]\ndt = 2.0\n"), ("case_d", "dt = \n")):
+        write_run(scratch / name)
+        (scratch / name / "case.toml").write_text(text)
+    code, text = compare(scratch / "case_a", scratch / "case_b")
+    assert (code, text) == (0, "3 files: the same bits\n"), text
+    expect_difference(scratch / "case_a", scratch / "case_c", "case.toml: dt: 1.0 and 2.0")
+    expect_difference(scratch / "case_a", scratch / "case_c", "case.toml: grains.0.file: 'case_grains_0.csv' and")
+    expect_difference(scratch / "case_a", scratch / "case_d", "case.toml: cannot be read")
+    expect_difference(scratch / "case_a", scratch / "a", f"case.toml: only in {scratch / 'case_a'}")
+    for name, row in (("case_a", "1,1,1"), ("case_b", "1,1,2")):
+        (scratch / name / "case_grains_0.csv").write_text(f"x,y,r\n{row}\n")
+    expect_difference(scratch / "case_a", scratch / "case_b", "case_grains_0.csv: line 2: r 1 and 2")
     (scratch / "nothing").mkdir()
     expect_difference(scratch / "a", scratch / "nothing", "no result folder")
 
