@@ -1,8 +1,8 @@
 """A plain discrete element method of disks: what grains do that are round, nearly rigid, and touch at points.
 
 Springs and dashpots along the normal, springs with Coulomb's limit along the tangent (Cundall and Strack, Geotechnique
-29, 1979, 47-65; Luding, Granular Matter 10, 2008, 235-246), velocity Verlet. Nothing resists rolling. A contact has the same stiffness
-whatever touches; its dashpot gives a pair of disks the restitution asked for. Only numpy is needed.
+29, 1979, 47-65; Luding, Granular Matter 10, 2008, 235-246), velocity Verlet. Nothing resists rolling. A contact has the
+same stiffness whatever touches; its dashpot gives a pair of disks the restitution asked for. Only numpy is needed.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""An elastic sphere, or a cylinder in plane strain, pressed between rigid plates without friction: a Lagrangian reference.
+"""An elastic sphere, or a cylinder in plane strain, between rigid plates without friction: a Lagrangian reference.
 
 Bilinear finite elements that move with the material, at finite strain, with Cairn's neo-Hookean law, in axial symmetry
 or plane strain. Symmetry leaves a quarter of a disk; the plate is a bound on the height of the nodes on its edge: those
 that would pull on it are let go, those that would pass it are held (an active set), and their reactions are the force.
-Hertz's solution is that for a small approach. With 16, 32 and 48 elements a side forces at approaches of 0.01 to 0.06 R are within
-1.5, 0.5 and 0.3 % of those with 64, radii within 2.5, 1 and 0.5 %, peak pressures within 5, 0.5 and 0.4 %.
+Hertz's solution is that for a small approach. With 16, 32 and 48 elements a side forces at approaches of 0.01 to 0.06 R
+are within 1.5, 0.5 and 0.3 % of those with 64, radii within 2.5, 1 and 0.5 %, peak pressures within 5, 0.5 and 0.4 %.
 
 Lengths are in radii, stresses in Young's moduli. Only numpy is needed.
 """
@@ -30,7 +30,7 @@ class State:
 
     approach: float  # over R
     force: float  # over E R^2, E R for the cylinder
-    width: float  # radius, or half-width, of the contact over R, from the mean square distance of the pressure from the axis
+    width: float  # radius, or half-width, of the contact over R, from the mean square distance of the pressure
     peak: float  # pressure in the middle over E
 
 
@@ -52,7 +52,7 @@ class Pressed:
         self.prepare_elements()
         self.move = np.zeros_like(self.place)  # displacement
         fixed = np.zeros(self.place.shape, bool)
-        fixed[0, :, 0] = fixed[-1, :, 1] = fixed[:, 0] = True  # axis, plane of symmetry, and the centre, many nodes in one
+        fixed[0, :, 0] = fixed[-1, :, 1] = fixed[:, 0] = True  # axis, plane of symmetry, and the centre
         self.fixed = fixed
         self.held = np.zeros(along + 1, bool)  # nodes of the edge on the plate
 
@@ -91,7 +91,8 @@ class Pressed:
         crossed = inverse[:, j[:, None], i[None, :]] * inverse[:, j[None, :], i[:, None]]  # -d(F^-T)_ij / dF_kl
         outer = g[:, :, None] * g[:, None, :]
         tangent = (self.bulk * J**2)[:, None, None] * outer - push[:, None] * crossed
-        tangent += scale[:, None] * (np.eye(len(PAIRS)) - 2 / 3 * (g[:, :, None] * f[:, None, :] + f[:, :, None] * g[:, None, :])
+        mixed = g[:, :, None] * f[:, None, :] + f[:, :, None] * g[:, None, :]
+        tangent += scale[:, None] * (np.eye(len(PAIRS)) - 2 / 3 * mixed
                                      + square[:, None] / 3 * (2 / 3 * outer + crossed))
         return stress, tangent
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib
 
-NAMES = ("block", "limits", "disk", "sphere", "backspin", "disks", "bars", "hertz", "cylinder", "collinear", "zigzag", "waves",
-         "rotation", "grains", "column")
+NAMES = ("block", "limits", "disk", "sphere", "backspin", "disks", "bars", "hertz", "cylinder", "collinear", "zigzag",
+         "waves", "rotation", "grains", "column", "rest", "walls")
 
 
 def load(names: list[str]) -> list:

@@ -120,5 +120,5 @@ def draw(folders: Folders, out: Path) -> list[Path]:
     return [draw_panels(out / "column.png", "Column of disks", [Panel("a = 1.5", "time [s]", "mean way [m]", curves)])]
 
 
-PROBLEM = Problem("column", "Column of disks collapses", "plain discrete element method of the same disks", runs, checks,
-                  draw, literal=(label(CELLS[0]),), forms=("cut",))
+PROBLEM = Problem("column", "Column of disks collapses", "plain discrete element method of the same disks", runs,
+                  checks, draw, literal=(label(CELLS[0]),), forms=("cut",))
