@@ -189,7 +189,10 @@ void ContactSweep<Dim>::set_normals(const Node& node, const Patch<Dim>& patch, c
     const double volume = sums[NodeSums<Dim>::volume] / lattice.cell_volume();
     const double flat = std::sqrt(2 * std::clamp(std::min(volume, 1 - volume), 0.0, 0.5));
     const double size = settings.gradient_share(sums, lattice, lattice.cell_volume()).norm();
-    return size < 0.1 ? size : size / (flat + 0.02);
+    if (size < 0.1) return size;
+    // Nothing is steeper than a flat surface but points whose squares overlap, as where a foot is pressed and spreads.
+    const double likeness = size / (flat + 0.02);
+    return likeness > 1 ? 1 / likeness : likeness;
   };
   const double of_partner = flatness(node.partner);
   for (int p = node.first_pair; p < node.first_pair + node.pair_count; ++p) {

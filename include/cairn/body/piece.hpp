@@ -15,7 +15,7 @@ struct Body {
   Vec3 centre = Vec3::Zero();            // at the start [m]
 };
 
-/// Sums over the points of a body at a node (NUMERICS, "Sums on the nodes"), eight doubles a node:
+/// Sums over the points of a body at a node, eight doubles a node:
 /// mass [kg], momentum [kg m/s], volume [m^Dim], outward gradient (volume or mass times grad N).
 template <int Dim>
 struct NodeSums {

@@ -1,8 +1,7 @@
 #pragma once
-/// Faces of the domain: fixed faces and symmetry planes as conditions on nodal velocities, walls as contact with a
-/// rigid half-space. Nodes beyond a face follow it: a fixed face's velocity holds there too, a wall acts as on the
-/// wall, and beyond a symmetry plane lies the mirror image. To add a kind of face: FaceType, its name in the case
-/// reader, and here.
+/// Faces of the domain as conditions on nodal velocities: fixed faces and symmetry planes. Nodes beyond a face follow it: a
+/// fixed face's velocity holds there too, and beyond a symmetry plane lies the mirror image. Walls are contact
+/// (contact/sweep.hpp). To add a kind of face: FaceType, its name in the case reader, and here.
 
 #include "cairn/contact/settings.hpp"
 
