@@ -118,7 +118,7 @@ class Filler {
       Box<Dim> inside;
       inside.upper.fill(per_direction_);
       std::optional<CutSites<Dim>> cut;
-      if (case_.solver.surface == Surface::cut && is_round(shape)) cut.emplace(cut_sites(shape, placed.shift, cells));
+      if (is_cut(shape)) cut.emplace(cut_sites(shape, placed.shift, cells));
       for_each(cells, [&](const Index<Dim>& cell) {
         for_each(inside, [&](const Index<Dim>& sub) {
           if (cut) {
@@ -176,6 +176,12 @@ class Filler {
     Vec3 shift;      // of the image that reaches here
     Box<Dim> cells;  // that its bounds touch
   };
+
+  /// Whether points at the shape's surface are cut; what is thinner than two points would lose them.
+  bool is_cut(const Shape& shape) const {
+    return case_.solver.surface == Surface::cut && is_round(shape) &&
+           smallest_width(shape) * per_direction_ >= 2 * lattice_.smallest_spacing();
+  }
 
   Index<Dim> site_of(const Index<Dim>& cell, const Index<Dim>& sub) const {
     Index<Dim> site;
