@@ -4,6 +4,7 @@
 
 #include "cairn/body/pack.hpp"
 #include "cairn/body/points.hpp"
+#include "cairn/core/printable.hpp"
 #include "cairn/material/registry.hpp"
 #include "commands.hpp"
 #include "report.hpp"
@@ -79,8 +80,8 @@ void print_summary(const Case& c) {
     cells += fmt::format("{}{}", k ? " x " : "", d.cells[k]);
     if (d.periodic[k]) periodic += fmt::format("{}{}", periodic.empty() ? ", periodic in " : " and ", "xyz"[k]);
   }
-  fmt::print("{}: ok\n", c.file.string());
-  if (!c.title.empty()) fmt::print("  title      {}\n", c.title);
+  fmt::print("{}: ok\n", printable(c.file.string()));
+  if (!c.title.empty()) fmt::print("  title      {}\n", printable(c.title));
   fmt::print("  dimension  {}{}\n", d.dimension, periodic);
   fmt::print("  cells      {}\n", cells);
   fmt::print("  bodies     {} of {} material{}\n", c.bodies.size(), c.materials.size(),

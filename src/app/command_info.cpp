@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "cairn/core/printable.hpp"
 #include "cairn/io/info.hpp"
 #include "commands.hpp"
 #include "report.hpp"
@@ -8,7 +9,7 @@ namespace cairn::app {
 
 int command_info(const std::filesystem::path& file) {
   return on_first_rank([&] {
-    const std::string text = describe_file(file);
+    const std::string text = printable(describe_file(file), true);
     fmt::print("{}{}", text, text.ends_with('\n') ? "" : "\n");
   });
 }

@@ -3,6 +3,9 @@
 #include <unistd.h>
 
 #include "cairn/core/error.hpp"
+#include "cairn/io/case_folder.hpp"
+#include "cairn/io/folder_lock.hpp"
+#include "cairn/io/own_files.hpp"
 #include "cairn/io/result_files.hpp"
 #include "cairn/solver/run.hpp"
 #include "commands.hpp"
@@ -13,24 +16,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Makes the folder of the results; returns the folders that were made, the innermost first.
-std::vector<fs::path> make_folder(const fs::path& out) {
+/// Makes the folder of the results, and adds the folders that were made to `made`, the innermost first.
+void make_folder(const fs::path& out, std::vector<fs::path>& made) {
   const auto fail = [&](std::string_view text) { throw InputError(fmt::format("--out: {}: {}", out.string(), text)); };
   std::error_code status;
-  std::vector<fs::path> made;
-  for (fs::path p = fs::absolute(out).lexically_normal(); !p.empty() && !fs::exists(p, status); p = p.parent_path())
-    if (p.has_filename()) made.push_back(p);
-  if (made.empty() && !fs::is_directory(out)) fail("is not a folder; choose another name");
+  std::vector<fs::path> missing;
+  fs::path p = fs::absolute(out).lexically_normal();
+  for (; !p.empty() && !fs::exists(p, status); p = p.parent_path()) {
+    if (status) fail(fmt::format("{} cannot be looked at ({}); choose another", p.string(), status.message()));
+    if (p.has_filename()) missing.push_back(p);
+  }
+  if (missing.empty() && !fs::is_directory(out, status)) fail("is not a folder; choose another name");
+  made = missing;
   fs::create_directories(out, status);
-  if (!fs::is_directory(out)) fail(fmt::format("the folder cannot be made ({}); choose another", status.message()));
-  if (access(out.c_str(), W_OK | X_OK) != 0) fail("the folder cannot be written to; choose another");
-  return made;
+  if (std::error_code other; !fs::is_directory(out, other))
+    fail(fmt::format("the folder cannot be made ({}); choose another", status.message()));
+  if (access(out.c_str(), R_OK | W_OK | X_OK) != 0) fail("the folder cannot be read and written to; choose another");
 }
 
 /// Refuses a folder that holds the results of another run.
 void check_free(const fs::path& out) {
   const auto results = find_results(out);
   if (results.empty()) return;
+  for (const auto& file : results)
+    if (const std::string reason = foreign_result(file); !reason.empty()) throw InputError("--out: " + reason);
   throw InputError(
       fmt::format("--out: {}: holds results already ({}{}); choose another folder, or add --overwrite to "
                   "remove them",
@@ -72,16 +81,20 @@ int command_run(const RunArguments& arguments) {
   settings.allow_changes = arguments.allow_changes;
   settings.command = command_line(arguments, settings.out);
   std::vector<fs::path> made;
+  FolderLock lock;  // of rank 0
   const auto prepare = [&] {
     if (settings.overwrite && !settings.restart.empty())
       throw InputError("--overwrite: would remove what --restart goes on from; give one of the two");
+    make_folder(settings.out, made);
+    lock = FolderLock(settings.out);
     if (!settings.overwrite && settings.restart.empty()) check_free(settings.out);
-    made = make_folder(settings.out);
+    if (const std::string reason = check_targets(c, settings.out); !reason.empty())
+      throw InputError("--out: " + reason);
   };
-  if (const int code = on_first_rank(prepare)) return code;
-
-  int code = done;
-  if (const int error = settle(attempt([&] { code = run_case(c, settings, MPI_COMM_WORLD); }))) code = error;
+  int code = on_first_rank(prepare);
+  if (code == done)
+    if (const int error = settle(attempt([&] { code = run_case(c, settings, MPI_COMM_WORLD); }))) code = error;
+  lock.release();
   std::error_code ignored;
   if (code == wrong_input)
     for (const auto& folder : made) fs::remove(folder, ignored);  // removes empty folders only

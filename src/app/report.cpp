@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/printable.hpp"
 #include "commands.hpp"
 
 namespace cairn::app {
@@ -29,7 +30,7 @@ MPI_Comm report_communicator() {
 
 void print(const Failure& failure) {
   std::fflush(stdout);
-  std::fputs((failure.text + "\n").c_str(), stderr);
+  std::fputs((printable(failure.text, true) + "\n").c_str(), stderr);
   std::fflush(stderr);
 }
 
@@ -121,7 +122,7 @@ int on_first_rank(const std::function<void()>& work) { return settle(rank() == 0
 
 void print_warnings(const std::vector<std::string>& warnings) {
   if (rank() != 0) return;
-  for (const auto& warning : warnings) std::fputs(("warning: " + warning + "\n").c_str(), stderr);
+  for (const auto& warning : warnings) std::fputs(("warning: " + printable(warning) + "\n").c_str(), stderr);
 }
 
 }  // namespace cairn::app

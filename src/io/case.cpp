@@ -35,6 +35,8 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   if (errors.count() == 0 && c.bodies.empty())
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   errors.throw_if_any();
+  check_points(c, errors);
+  errors.throw_if_any();
 
   warn_about_bodies(c);
   c.resolved = write_case(draft);

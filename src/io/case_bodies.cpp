@@ -118,6 +118,14 @@ int read_material_name(Table& table, const std::vector<Material>& materials, boo
   return std::max(0, found);
 }
 
+/// The name of a table's copy beside the results; a table that is read twice has one.
+std::string add_table(std::vector<CaseTable>& tables, const std::filesystem::path& file, std::uint64_t checksum) {
+  const auto known = std::ranges::find(tables, file, &CaseTable::file);
+  if (known != tables.end()) return known->copy;
+  tables.push_back({file, fmt::format("case_grains_{}.csv", tables.size()), checksum});
+  return tables.back().copy;
+}
+
 /// Reads one way of selecting bodies, from the drive itself or from its table `bodies`; adds how many were given.
 void read_selection(Table& table, const Draft& draft, Drive& drive, int& given) {
   const auto& bodies = draft.result.bodies;
@@ -234,8 +242,9 @@ void read_grains(Table& root, Draft& draft, Errors& errors) {
       continue;
     }
     const std::size_t before = errors.count();
-    read_grain_table(path, spec, draft, errors);
+    const std::uint64_t checksum = read_grain_table(path, spec, draft, errors);
     draft.bodies_known = known && errors.count() == before;
+    spec.copy = add_table(draft.result.tables, spec.file, checksum);
     draft.grains.push_back(std::move(spec));
   }
 }

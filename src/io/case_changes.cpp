@@ -9,6 +9,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/checksum.hpp"
+#include "case_reader.hpp"
 
 namespace cairn {
 
@@ -43,13 +44,9 @@ void flatten(const toml::node& node, const std::string& path, Values& values) {
 }
 
 Values values_of(const std::string& text) {
-  try {
-    Values values;
-    flatten(toml::parse(text), "", values);
-    return values;
-  } catch (const toml::parse_error& error) {
-    throw InputError(fmt::format("the case in a checkpoint is no TOML: {}", error.description()));
-  }
+  Values values;
+  flatten(reading::parse_text(text, "the case in the checkpoint"), "", values);
+  return values;
 }
 
 /// Adds every number of a shape.

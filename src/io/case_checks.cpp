@@ -6,6 +6,8 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "cairn/body/cut_sites.hpp"
+#include "cairn/grid/box.hpp"
 #include "case_sections.hpp"
 
 namespace cairn::reading {
@@ -13,7 +15,10 @@ namespace {
 
 constexpr double deepest_overlap = 0.01;  // of the smaller radius, without a warning
 constexpr double least_width = 2.0;       // cells
-constexpr double on_face = 1e-6;          // cells; a body this near to a face sits on it on purpose
+// Added to the sites of points, in cells, as the set-up does it: one on a face that two bodies share goes to one of
+// them.
+constexpr double site_aside[] = {1e-7, 1e-7 * 0.7549, 1e-7 * 0.5698};
+constexpr double on_face = 1e-6;  // cells; a body this near to a face sits on it on purpose
 
 struct Disc {
   Vec3 centre;
@@ -159,7 +164,77 @@ void warn_about_fixed_faces(Case& c) {
         first, count, c.bodies.size()));
 }
 
+/// Cells that the bounds of a shape reach in the domain; empty where they miss it.
+Box<3> cells_of(const Bounds& b, const Domain& d) {
+  Box<3> cells;
+  for (int k = 0; k < 3; ++k) {
+    const double size = (d.upper[k] - d.lower[k]) / d.cells[k];
+    const auto at = [&](double x) { return std::clamp((x - d.lower[k]) / size, 0.0, double(d.cells[k])); };
+    cells.lower[k] = k < d.dimension ? static_cast<int>(std::floor(at(b.lower[k]))) : 0;
+    cells.upper[k] = k < d.dimension ? static_cast<int>(std::ceil(at(b.upper[k]))) : 1;
+  }
+  return cells;
+}
+
+/// Whether a run would place a point in a shape that is moved by `shift`: one of the regular sites of the cells lies
+/// inside. Looks at `sites` places at the most and takes the rest for granted: the set-up of a run counts them all.
+bool holds_site(const Shape& shape, const Vec3& shift, const Case& c, std::int64_t& sites) {
+  const Domain& d = c.domain;
+  const int per = static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / d.dimension)));
+  Vec3 spacing = Vec3::Zero();
+  for (int k = 0; k < d.dimension; ++k) spacing[k] = (d.upper[k] - d.lower[k]) / d.cells[k];
+  const auto inside = [&](const std::array<std::int64_t, 3>& site) {
+    Vec3 x = Vec3::Zero();
+    for (int k = 0; k < d.dimension; ++k)
+      x[k] = d.lower[k] + (static_cast<double>(site[k]) + 0.5) / per * spacing[k] + site_aside[k] * spacing[k];
+    return contains(shape, x - shift);
+  };
+  Bounds b = bounds(shape);
+  b.lower += shift, b.upper += shift;
+  const Box<3> cells = cells_of(b, d);
+  if (cells.empty()) return false;
+  std::array<std::int64_t, 3> near{}, at{};  // near: the site next to the centre, which lies inside of most shapes
+  for (int k = 0; k < d.dimension; ++k) {
+    const double scaled = (centre(shape)[k] + shift[k] - d.lower[k]) / spacing[k] * per;
+    near[k] = static_cast<std::int64_t>(std::clamp(std::floor(scaled), 0.0, double(d.cells[k]) * per - 1));
+  }
+  if (inside(near)) return true;
+  const int depth = d.dimension == 3 ? per : 1;
+  for (at[2] = cells.lower[2] * depth; at[2] < std::int64_t{cells.upper[2]} * depth; ++at[2])
+    for (at[1] = std::int64_t{cells.lower[1]} * per; at[1] < std::int64_t{cells.upper[1]} * per; ++at[1])
+      for (at[0] = std::int64_t{cells.lower[0]} * per; at[0] < std::int64_t{cells.upper[0]} * per; ++at[0])
+        if (--sites < 0 || inside(at)) return true;
+  return false;
+}
+
 }  // namespace
+
+void check_points(const Case& c, Errors& errors) {
+  constexpr std::size_t most_reported = 20;
+  const Domain& d = c.domain;
+  const std::size_t before = errors.count();
+  for (std::size_t i = 0; i < c.bodies.size() && errors.count() < before + most_reported; ++i) {
+    const Shape& shape = c.bodies[i].shape;
+    if (c.solver.surface == Surface::cut && is_round(shape)) continue;  // has points of any size
+    std::int64_t sites = 10'000'000;
+    bool found = false;
+    for (int image = 0; image < 27 && !found; ++image) {
+      Vec3 shift = Vec3::Zero();
+      bool reached = true;
+      for (int k = 0, rest = image; k < 3; ++k, rest /= 3) {
+        const int turns = rest % 3 == 2 ? -1 : rest % 3;
+        reached = reached && (turns == 0 || d.periodic[k]);
+        shift[k] = turns * (d.upper[k] - d.lower[k]);
+      }
+      found = reached && holds_site(shape, shift, c, sites);
+    }
+    if (!found)
+      errors.add({c.bodies[i].source, 0}, "",
+                 fmt::format("body {} holds no material point: it is smaller than the spacing of the points or lies "
+                             "outside the domain; use smaller cells or more points per cell",
+                             i));
+  }
+}
 
 std::string placement_problem(const Shape& shape, const Domain& domain) {
   const Bounds b = bounds(shape);

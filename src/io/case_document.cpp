@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/printable.hpp"
 #include "case_reader.hpp"
 
 namespace cairn::reading {
@@ -16,11 +17,46 @@ namespace {
 
 constexpr std::uintmax_t largest_file = std::uintmax_t{1} << 32;
 
-/// `text` without what a terminal would act on.
-std::string printable(std::string_view text) {
-  std::string result;
-  for (const char c : text.substr(0, 300)) result += static_cast<unsigned char>(c) < 32 || c == 127 ? '?' : c;
-  return result;
+constexpr std::size_t longest_text = 300;  // of a file in a message
+
+std::string shortened(std::string_view text) { return printable(text.substr(0, longest_text)); }
+
+constexpr int most_key_parts = 32;
+
+/// The line that has a key of more parts than any table is deep; 0 where there is none. The parser takes a key apart
+/// into tables within tables, of which thousands would not fit on the stack. Counted are the dots outside of strings
+/// and comments between what may end a key.
+std::int64_t line_of_long_key(std::string_view text) {
+  std::int64_t line = 1;
+  int dots = 0;
+  std::string_view quote;  // that ends the string; empty outside of strings
+  const auto at_quote = [&](std::size_t i) {
+    for (const char* mark : {"\"\"\"", "'''", "\"", "'"})
+      if (text.substr(i).starts_with(mark)) return std::string_view(mark);
+    return std::string_view();
+  };
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '\n') ++line;
+    if (!quote.empty()) {
+      const bool one_line = quote.size() == 1;
+      if (c == '\\' && quote[0] == '"') {
+        if (++i < text.size() && text[i] == '\n') ++line;
+      } else if (text.substr(i).starts_with(quote) || (one_line && c == '\n')) {
+        i += c == '\n' ? 0 : quote.size() - 1;
+        quote = {};
+      }
+    } else if (c == '#') {
+      i = std::min(text.find('\n', i), text.size()) - 1;
+    } else if (quote = at_quote(i); !quote.empty()) {
+      i += quote.size() - 1;
+    } else if (c == '.') {
+      if (++dots >= most_key_parts) return line;
+    } else if (std::string_view("=,{}[]\n").find(c) != std::string_view::npos) {
+      dots = 0;
+    }
+  }
+  return 0;
 }
 
 std::vector<std::string> split_key(std::string_view key) {
@@ -39,14 +75,14 @@ toml::node* descend(toml::node& node, const std::string& part, const Location& w
   toml::array* array = node.as_array();
   if (!array) {
     errors.add(where, "",
-               fmt::format("'{}' is inside a plain value; only tables and arrays have parts", printable(part)));
+               fmt::format("'{}' is inside a plain value; only tables and arrays have parts", shortened(part)));
     return nullptr;
   }
   std::size_t index = 0;
   const auto [end, status] = std::from_chars(part.data(), part.data() + part.size(), index);
   if (status == std::errc{} && end == part.data() + part.size() && index < array->size()) return array->get(index);
   errors.add(where, "",
-             fmt::format("'{}' is not an entry of the array; it has {} entries, counted from 0", printable(part),
+             fmt::format("'{}' is not an entry of the array; it has {} entries, counted from 0", shortened(part),
                          array->size()));
   return nullptr;
 }
@@ -62,6 +98,7 @@ bool is_word(std::string_view text) {
 
 /// A table of one `value`; an empty one where the text is no value.
 toml::table parse_value(const std::string& text, const std::string& source) {
+  if (line_of_long_key(text) > 0) return {};
   try {
     return toml::parse("value = " + text, source);
   } catch (const toml::parse_error&) {
@@ -70,15 +107,17 @@ toml::table parse_value(const std::string& text, const std::string& source) {
 }
 
 void apply(toml::table& root, const Override& change, Errors& errors) {
-  const Location where{"--set " + printable(change.key), 0};
+  const Location where{"--set " + shortened(change.key), 0};
   const auto parts = split_key(change.key);
   for (const auto& part : parts)
     if (part.empty()) return errors.add(where, "", "not a key; write --set table.key=VALUE");
+  if (parts.size() > most_key_parts)
+    return errors.add(where, "", fmt::format("a key of {} parts; no table is that deep", parts.size()));
   toml::table parsed = parse_value(change.value, where.file);
   if (parsed.size() != 1 || !parsed.get("value"))
     return errors.add(where, "",
                       fmt::format("{} is not a TOML value; strings need quotes: --set '{}=\"text\"'",
-                                  in_quotes(change.value), printable(change.key)));
+                                  in_quotes(change.value), shortened(change.key)));
   toml::node* node = &root;
   for (std::size_t i = 0; i + 1 < parts.size() && node; ++i) node = descend(*node, parts[i], where, errors);
   if (!node) return;
@@ -101,7 +140,7 @@ void apply(toml::table& root, const Override& change, Errors& errors) {
 
 std::string read_text(const std::filesystem::path& file, std::string_view what) {
   const auto fail = [&](std::string_view text) {
-    throw InputError(fmt::format("{}: {}", printable(file.string()), text));
+    throw InputError(fmt::format("{}: {}", shortened(file.string()), text));
   };
   std::error_code status;
   if (!std::filesystem::exists(file, status)) fail(fmt::format("there is no such file; {} is needed", what));
@@ -115,20 +154,34 @@ std::string read_text(const std::filesystem::path& file, std::string_view what) 
   text << stream.rdbuf();
   if (stream.bad()) fail("cannot be read to its end");
   std::string content = std::move(text).str();
+  if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF"))
+    fail(fmt::format("is text in UTF-16, as its first two bytes say; save it as UTF-8; {} is needed", what));
   if (content.find('\0') != std::string::npos) fail(fmt::format("is not a text file; {} is needed", what));
   return content;
 }
 
+std::string_view without_mark(std::string_view text) {
+  constexpr std::string_view mark = "\xEF\xBB\xBF";
+  return text.substr(text.starts_with(mark) ? mark.size() : 0);
+}
+
+toml::table parse_text(std::string_view text, const std::string& name) {
+  if (const std::int64_t line = line_of_long_key(text); line > 0)
+    throw InputError(fmt::format("{}:{}: not valid TOML: a key of more than {} parts", name, line, most_key_parts));
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw InputError(
+        fmt::format("{}:{}: not valid TOML: {}", name, error.source().begin.line, shortened(error.description())));
+  }
+}
+
 toml::table parse_file(const std::filesystem::path& file, std::string_view what) {
-  const std::string content = read_text(file, what);
+  const std::string text = read_text(file, what);
+  const std::string_view content = without_mark(text);
   if (content.find_first_not_of(" \t\r\n") == std::string::npos)
     throw InputError(fmt::format("{}:1: the file is empty; {} is needed", file.string(), what));
-  try {
-    return toml::parse(content, file.string());
-  } catch (const toml::parse_error& error) {
-    throw InputError(fmt::format("{}:{}: not valid TOML: {}", file.string(), error.source().begin.line,
-                                 printable(error.description())));
-  }
+  return parse_text(content, file.string());
 }
 
 void apply_overrides(toml::table& root, const std::vector<Override>& overrides, Errors& errors) {

@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/memory.hpp"
+#include "cairn/io/checksum.hpp"
 #include "case_sections.hpp"
 
 namespace cairn::reading {
@@ -152,16 +155,42 @@ class GrainTable {
   std::vector<std::string_view> cells_;
 };
 
+/// Ranks of this program on this machine, each of which reads the table; 1 where that is not known.
+int ranks_here() {
+  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"})
+    if (const char* text = std::getenv(name)) return std::max(1, std::atoi(text));
+  return 1;
+}
+
+/// Makes room for the rows of a table. \throws InputError "FILE: ..." where there is not that much memory
+void make_room(const std::filesystem::path& file, std::string_view text, std::vector<BodySpec>& bodies) {
+  constexpr double more =
+      250;  // of a body: where it was read, its place in the search for overlaps, what the solver knows
+  const auto rows = std::ranges::count(text, '\n') + 1;
+  const double needed = static_cast<double>(rows) * (sizeof(BodySpec) + more);
+  const double there = std::min(available_memory() / ranks_here(), memory_limit());
+  if (needed > there)
+    throw InputError(
+        fmt::format("{}: holds {} lines, which need at least {:.3g} GB of memory on every rank; there are "
+                    "{:.3g} GB; use fewer grains or ranks, or more machines",
+                    file.string(), rows, 1e-9 * needed, 1e-9 * there));
+  bodies.reserve(bodies.size() + static_cast<std::size_t>(rows));
+}
+
 }  // namespace
 
-void read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors) {
+std::uint64_t read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft,
+                               Errors& errors) {
   try {
     const std::string text = read_text(file, "a grain table (CSV)");
-    GrainTable(file, spec, draft, errors).read(text);
+    make_room(file, text, draft.result.bodies);
+    GrainTable(file, spec, draft, errors).read(without_mark(text));
+    return checksum(std::span<const char>(text));
   } catch (const InputError& error) {  // the file cannot be read
     const std::string_view message = error.what();
     errors.add({file.string(), 0}, "", message.substr(std::min(message.size(), file.string().size() + 2)));
   }
+  return 0;
 }
 
 }  // namespace cairn::reading

@@ -45,9 +45,9 @@ inline constexpr Named<CompoundOperation> compound_names[] = {{"union", Compound
                                                               {"difference", CompoundOperation::difference},
                                                               {"intersection", CompoundOperation::intersection}};
 
-/// Fields of the particle files, beside the position, which is always written.
+/// Fields of the particle files that every point has, beside the position, which is always written.
 inline constexpr std::string_view particle_fields[] = {
-    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "plastic_strain", "image", "spin"};
+    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "image", "spin"};
 inline constexpr std::size_t default_particle_fields = 6;  // the first six
 
 }  // namespace cairn::reading

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/printable.hpp"
 
 namespace cairn::reading {
 
@@ -89,7 +90,7 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
 
 std::string in_quotes(std::string_view text) {
   std::string result = "\"";
-  for (const char c : text.substr(0, 60)) result += static_cast<unsigned char>(c) < 32 || c == 127 ? '?' : c;
+  result += printable(text.substr(0, 60));
   return result + (text.size() > 60 ? "...\"" : "\"");
 }
 

@@ -157,6 +157,12 @@ std::string_view name_of(const Named<E> (&names)[N], E value) {
 /// Reads a whole text file. \throws InputError when it is not a readable text file.
 std::string read_text(const std::filesystem::path& file, std::string_view what);
 
+/// The text without a byte order mark of UTF-8 at its start, as spreadsheets write it.
+std::string_view without_mark(std::string_view text);
+
+/// Parses TOML; `name` says in messages where it is from. \throws InputError with name and line.
+toml::table parse_text(std::string_view text, const std::string& name);
+
 /// Parses a TOML file. \throws InputError with file and line.
 toml::table parse_file(const std::filesystem::path& file, std::string_view what);
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cairn/material/variables.hpp"
 #include "case_names.hpp"
 
 namespace cairn::reading {
@@ -80,15 +81,23 @@ void read_schedule(Table& table, Schedule& schedule) {
   schedule.interval_wall = table.has("interval_wall") ? table.number("interval_wall", std::nullopt, positive) : 0;
 }
 
+/// What particle files can hold: what every point has, and the variables of the laws.
+std::vector<std::string_view> known_fields() {
+  std::vector<std::string_view> names(std::begin(particle_fields), std::end(particle_fields));
+  for (const std::string_view variable : law_variables())
+    if (std::ranges::find(names, variable) == names.end()) names.push_back(variable);
+  return names;
+}
+
 void read_fields(Table& table, Schedule& schedule) {
   schedule.fields.assign(std::begin(particle_fields), std::begin(particle_fields) + default_particle_fields);
   if (!table.has("fields")) return;
   schedule.fields.clear();
   for (const auto& name : table.texts("fields")) {
     if (name == "position") continue;  // always written
-    if (std::ranges::find(particle_fields, std::string_view(name)) == std::end(particle_fields)) {
-      table.error("fields",
-                  fmt::format("{} is not a choice; choose from {}", in_quotes(name), listed(particle_fields)));
+    const auto known = known_fields();
+    if (std::ranges::find(known, std::string_view(name)) == known.end()) {
+      table.error("fields", fmt::format("{} is not a choice; choose from {}", in_quotes(name), listed(known)));
     } else if (std::ranges::find(schedule.fields, name) != schedule.fields.end()) {
       table.error("fields", fmt::format("{} is listed twice; list it once", in_quotes(name)));
     } else {
@@ -100,6 +109,12 @@ void read_fields(Table& table, Schedule& schedule) {
 /// Index of the material of one side of a pair; nothing after an error.
 std::optional<int> pair_side(Table& table, const std::vector<Material>& materials, const std::string& name) {
   const int found = find_material(materials, name);
+  if (found >= 0 && name == "wall") {
+    table.error("materials",
+                "\"wall\" is a material here, and the word for the faces of type wall; name the material "
+                "otherwise");
+    return std::nullopt;
+  }
   if (found >= 0 || name == "wall") return found;
   table.error("materials",
               fmt::format("{} is not a material; known are {}, wall", in_quotes(name), material_list(materials)));

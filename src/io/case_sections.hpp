@@ -8,6 +8,7 @@ namespace cairn::reading {
 /// One [[grains]] entry: a table of balls and what they share.
 struct GrainsSpec {
   std::filesystem::path file;  // absolute
+  std::string copy;            // its name beside the results
   int material = -1;           // -1: every row names its own
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
   double initial_pressure = 0;
@@ -37,8 +38,8 @@ void read_bodies(Table& root, Draft& draft, Errors& errors);
 void read_grains(Table& root, Draft& draft, Errors& errors);
 void read_drives(Table& root, Draft& draft);
 
-/// Appends the balls of a grain table.
-void read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors);
+/// Appends the balls of a grain table; returns the checksum of its bytes.
+std::uint64_t read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors);
 
 /// Reports ids of bodies that do not exist.
 void check_ids(Table& table, std::string_view key, const std::vector<int>& ids, const Draft& draft);
@@ -56,6 +57,8 @@ void check_pressures(const Draft& draft, Errors& errors);
 std::string placement_problem(const Shape& shape, const Domain& domain);
 /// Adds the warnings: overlapping balls, bodies thinner than two cells, bodies held by a fixed face.
 void warn_about_bodies(Case& result);
+/// A body that gets no material point is an error.
+void check_points(const Case& c, Errors& errors);
 
 /// The complete case file of a draft.
 std::string write_case(const Draft& draft);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "case_names.hpp"
 #include "case_sections.hpp"
@@ -31,6 +32,51 @@ Shape read_ellipsoid(Table& t, int dim) {
                    t.number("angle", 0.0)};
 }
 
+/// Twice the area of the triangle a b c, positive anticlockwise.
+double turn(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
+}
+
+/// The point c, which lies on the line through a and b, lies between them.
+bool between(const Vec3& a, const Vec3& b, const Vec3& c) { return (a - c).cwiseProduct(b - c).maxCoeff() <= 0; }
+
+/// The edges a b and c d have a point in common.
+bool meet(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  const double abc = turn(a, b, c), abd = turn(a, b, d), cda = turn(c, d, a), cdb = turn(c, d, b);
+  if (abc * abd < 0 && cda * cdb < 0) return true;
+  return (abc == 0 && between(a, b, c)) || (abd == 0 && between(a, b, d)) || (cda == 0 && between(c, d, a)) ||
+         (cdb == 0 && between(c, d, b));
+}
+
+/// Two edges that meet elsewhere than at the point they follow each other at, by the points they begin at; nothing
+/// where there are none. Edges are compared with those that overlap them in x.
+std::optional<std::pair<std::size_t, std::size_t>> crossing_edges(const std::vector<Vec3>& p) {
+  const std::size_t n = p.size();
+  const auto end = [&](std::size_t i) -> const Vec3& { return p[(i + 1) % n]; };
+  const auto low = [&](std::size_t i) { return std::min(p[i].x(), end(i).x()); };
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, low);
+  for (std::size_t k = 0; k < n; ++k)
+    for (std::size_t m = k + 1; m < n && low(order[m]) <= std::max(p[order[k]].x(), end(order[k]).x()); ++m) {
+      const auto [i, j] = std::minmax(order[k], order[m]);
+      const bool next = j == i + 1, last = i == 0 && j == n - 1;
+      const std::size_t a = last ? j : i, b = last ? i : j;  // edge b begins where a ends
+      const bool back = turn(p[a], p[b], end(b)) == 0 && (p[a] - p[b]).dot(end(b) - p[b]) > 0;
+      if (next || last ? back : meet(p[i], end(i), p[j], end(j))) return std::pair(i, j);
+    }
+  return std::nullopt;
+}
+
+/// The points without those that repeat the one before, the first at the end among them.
+std::vector<Vec3> without_repeated(const std::vector<Vec3>& points) {
+  std::vector<Vec3> kept;
+  for (const Vec3& p : points)
+    if (kept.empty() || p != kept.back()) kept.push_back(p);
+  while (kept.size() > 1 && kept.back() == kept.front()) kept.pop_back();
+  return kept;
+}
+
 Shape read_polygon(Table& t, int dim) {
   const std::size_t before = t.error_count();
   Polygon polygon{t.vectors("points", dim)};
@@ -45,6 +91,11 @@ Shape read_polygon(Table& t, int dim) {
     t.error("points", fmt::format("has {} points; a polygon needs at least 3", polygon.points.size()));
   } else if (std::abs(area) <= 1e-12 * size) {
     t.error("points", "enclose no area; the points must not lie on one line");
+  } else if (const auto corners = without_repeated(polygon.points); const auto edges = crossing_edges(corners)) {
+    const Vec3 &a = corners[edges->first], &b = corners[edges->second];
+    t.error("points", fmt::format("the edges that begin at [{}, {}] and [{}, {}] cross or touch each other; give the "
+                                  "corners in the order in which they follow each other around the body",
+                                  a.x(), a.y(), b.x(), b.y()));
   }
   return polygon;
 }

@@ -195,7 +195,7 @@ void write_bodies(Writer& out, const Draft& draft) {
   }
   for (const auto& grains : draft.grains) {
     out.section("[[grains]]");
-    out.key("file", grains.file.string());
+    out.key("file", grains.copy);
     if (grains.material >= 0) out.key("material", c.materials[grains.material].name);
     out.motion(grains.velocity, grains.angular_velocity);
     out.key("initial_pressure", grains.initial_pressure);

@@ -12,7 +12,7 @@ namespace cairn {
 namespace {
 
 constexpr const char* checkpoint_kind = "checkpoint";
-constexpr std::int64_t format_version = 3;
+constexpr std::int64_t format_version = 4;
 
 }  // namespace
 

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -40,6 +41,20 @@ std::string read_prefix(const std::filesystem::path& file, const std::vector<std
   return {};
 }
 
+/// Removes what an earlier run left under that name: a file whose header begins alike. Returns the error, empty if
+/// none.
+std::string remove_earlier(const std::filesystem::path& file, const std::vector<std::string>& columns) {
+  struct stat facts = {};
+  if (::lstat(file.c_str(), &facts) != 0) return {};
+  const std::string start = fmt::format(
+      "{}", fmt::join(columns.begin(), columns.begin() + std::min<std::ptrdiff_t>(3, std::ssize(columns)), ","));
+  std::string head(start.size(), '\0');
+  if (S_ISREG(facts.st_mode)) std::ifstream(file, std::ios::binary).read(head.data(), std::ssize(head));
+  if (!S_ISREG(facts.st_mode) || (facts.st_size > 0 && head != start))
+    return fmt::format("cannot create {}: something is there that cairn did not write", file.string());
+  return ::unlink(file.c_str()) == 0 ? "" : fmt::format("cannot replace {}: {}", file.string(), std::strerror(errno));
+}
+
 }  // namespace
 
 std::string check_prefix(const std::filesystem::path& file, const std::vector<std::string>& columns,
@@ -50,7 +65,9 @@ std::string check_prefix(const std::filesystem::path& file, const std::vector<st
 
 CsvWriter::CsvWriter(std::filesystem::path file, std::vector<std::string> columns)
     : file_(std::move(file)), columns_(columns.size()) {
-  descriptor_ = ::open(file_.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_APPEND | O_CLOEXEC, 0666);
+  error_ = remove_earlier(file_, columns);
+  if (!error_.empty()) return;
+  descriptor_ = ::open(file_.c_str(), O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY | O_APPEND | O_CLOEXEC, 0666);
   if (descriptor_ < 0) {
     error_ = fmt::format("cannot create {}: {}", file_.string(), std::strerror(errno));
     return;
@@ -62,7 +79,7 @@ CsvWriter::CsvWriter(std::filesystem::path file, std::vector<std::string> column
     : file_(std::move(file)), columns_(columns.size()), bytes_(from.bytes) {
   error_ = read_prefix(file_, columns, from, sum_);
   if (!error_.empty()) return;
-  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  descriptor_ = ::open(file_.c_str(), O_WRONLY | O_APPEND | O_NOFOLLOW | O_CLOEXEC);
   if (descriptor_ < 0 || ::ftruncate(descriptor_, from.bytes) != 0)
     error_ = fmt::format("cannot go on with {}: {}", file_.string(), std::strerror(errno));
 }
@@ -114,6 +131,9 @@ void CsvWriter::append(const std::string& line) {
   if (written == static_cast<ssize_t>(line.size())) {
     bytes_ += written;
     sum_.add_values(std::span<const char>(line));
+    struct stat facts = {};
+    if (::fstat(descriptor_, &facts) == 0 && facts.st_nlink == 0)
+      error_ = fmt::format("cannot write {}: it was removed while the run wrote it", file_.string());
     return;
   }
   const int reason = written < 0 ? errno : ENOSPC;  // the system wrote what still fitted

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
 #include <string_view>
 
 #include "cairn/core/error.hpp"
+#include "cairn/io/own_files.hpp"
 #include "table_writer.hpp"
 
 namespace cairn {
@@ -31,7 +31,8 @@ bool is_number(std::string_view text) {
 }  // namespace
 
 bool is_result_name(const std::string& name) {
-  if (name == "history.csv" || name == "bodies.csv" || name.ends_with(".hdf.series")) return true;
+  for (const char* one : {"history.csv", "bodies.csv", "particles.hdf.series", failure_file})
+    if (name == one) return true;
   return std::ranges::any_of(numbered, [&](const Numbered& n) {
     return name.size() > n.start.size() + n.ending.size() && name.starts_with(n.start) && name.ends_with(n.ending) &&
            is_number(std::string_view(name).substr(n.start.size(), name.size() - n.start.size() - n.ending.size()));
@@ -91,14 +92,12 @@ std::string UnflushedFiles::flush() {
 
 std::string replace_file(const fs::path& file, const std::string& text) {
   const fs::path temporary = temporary_name(file);
-  errno = 0;
-  std::FILE* stream = std::fopen(temporary.c_str(), "w");
-  if (stream == nullptr) return write_failure(file, "creating the file", std::strerror(errno));
-  const bool written = std::fwrite(text.data(), 1, text.size(), stream) == text.size();
-  const bool closed = std::fclose(stream) == 0;
-  std::string error = written && closed ? "" : write_failure(file, "writing", std::strerror(errno));
+  PosixFile out = create_temporary(temporary);
+  if (!out.valid()) return write_failure(file, "creating the file", std::strerror(errno));
+  const bool good = out.write(text.data(), std::ssize(text), 0) && out.close();
+  std::string error = good ? "" : write_failure(file, "writing", std::strerror(errno));
   if (error.empty()) error = publish(temporary, file);
-  if (!error.empty()) std::remove(temporary.c_str());
+  if (!error.empty()) ::unlink(temporary.c_str());
   return error;
 }
 
@@ -121,6 +120,7 @@ std::string remove_results(const fs::path& folder) {
   try {
     for (const auto& file : find_results(folder)) {
       std::error_code error;
+      if (const std::string reason = foreign_result(file); !reason.empty()) return reason;
       fs::remove(file, error);
       if (error) return fmt::format("cannot remove {}: {}", file.string(), error.message());
     }

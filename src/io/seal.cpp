@@ -72,7 +72,7 @@ std::string seal(const std::filesystem::path& file, MPI_Comm comm) {
   int rank = 0;
   MPI_Comm_rank(comm, &rank);
   errno = 0;
-  const PosixFile open(file, rank == 0 ? O_RDWR : O_RDONLY);
+  const PosixFile open(file, O_NOFOLLOW | (rank == 0 ? O_RDWR : O_RDONLY));
   std::int64_t length = open.valid() ? open.size() : -1;
   std::string error = length < 0 ? fmt::format("it cannot be read back: {}", std::strerror(errno)) : "";
   error = common_error(comm, error);

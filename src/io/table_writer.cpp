@@ -84,6 +84,11 @@ std::filesystem::path temporary_name(const std::filesystem::path& file) {
   return folder_of(file) / fmt::format(".{}.part", file.filename().string());
 }
 
+PosixFile create_temporary(const std::filesystem::path& temporary) {
+  if (::unlink(temporary.c_str()) != 0 && errno != ENOENT) return {};
+  return {temporary, O_CREAT | O_EXCL | O_NOFOLLOW | O_WRONLY};
+}
+
 std::string write_failure(const std::filesystem::path& file, const std::string& what, const std::string& reason) {
   std::error_code error;
   const auto space = std::filesystem::space(folder_of(file), error);
@@ -93,7 +98,7 @@ std::string write_failure(const std::filesystem::path& file, const std::string& 
 }
 
 std::string flush_to_disk(const std::filesystem::path& file) {
-  const PosixFile open(file, O_RDWR);
+  const PosixFile open(file, O_RDWR | O_NOFOLLOW);
   if (!open.valid() || !open.flush()) return write_failure(file, "flushing to disk", std::strerror(errno));
   flush_name(file);
   return {};
@@ -137,20 +142,21 @@ void TableWriter::require(bool good, const std::string& what) {
 
 void TableWriter::create(std::int64_t bytes) {
   constexpr std::int64_t metadata = 128 * 1024;
-  reserve(bytes + metadata, 0);
+  reserve(bytes + metadata, true);
   on_first_rank("creating the file", [&] {
     handle_ = Handle(H5Fcreate(temporary_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose);
     return handle_.valid();
   });
-  reserve(bytes + metadata, FALLOC_FL_KEEP_SIZE);  // HDF5 has emptied the file
-  rows_ = PosixFile(temporary_, O_WRONLY);
+  reserve(bytes + metadata, false);  // HDF5 has emptied the file
+  rows_ = PosixFile(temporary_, O_WRONLY | O_NOFOLLOW);
   require(rows_.valid(), "opening the file");
 }
 
-void TableWriter::reserve(std::int64_t bytes, int mode) {
+void TableWriter::reserve(std::int64_t bytes, bool fresh) {
   std::string error;
   if (rank_ == 0) {
-    const PosixFile file(temporary_, O_CREAT | O_WRONLY);
+    const PosixFile file = fresh ? create_temporary(temporary_) : PosixFile(temporary_, O_WRONLY | O_NOFOLLOW);
+    const int mode = fresh ? 0 : FALLOC_FL_KEEP_SIZE;
     if (!file.valid())
       error = write_failure(file_, "creating the file", std::strerror(errno));
     else if (const int reason = claim_space(file.descriptor(), mode, bytes); reason != 0)

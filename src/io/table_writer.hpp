@@ -22,6 +22,10 @@ std::string publish(const std::filesystem::path& temporary, const std::filesyste
 /// `.NAME.part` in the folder of `file`.
 std::filesystem::path temporary_name(const std::filesystem::path& file);
 
+/// Creates a file under a temporary name, for writing. What a program that was killed left there is removed; a link
+/// that somebody put there goes with it and is never followed. Where it fails, errno says why.
+PosixFile create_temporary(const std::filesystem::path& temporary);
+
 /// Every member function is collective, and throws the same RunError on every rank if it fails on any. Destroyed before
 /// finish(), the writer removes what it wrote, without communication.
 ///
@@ -81,8 +85,8 @@ class TableWriter {
   void create(std::int64_t bytes);
   /// Closes and removes the unfinished file.
   void discard();
-  /// Claims space on rank 0; throws on every rank if there is not enough.
-  void reserve(std::int64_t bytes, int mode);
+  /// Claims space on rank 0 in the temporary file, or in a new one; throws on every rank if there is not enough.
+  void reserve(std::int64_t bytes, bool fresh);
 
   std::filesystem::path file_, temporary_;
   MPI_Comm comm_;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "cairn/core/error.hpp"
+#include "cairn/material/variables.hpp"
 
 namespace cairn {
 namespace {
@@ -18,6 +19,15 @@ struct Table<std::variant<Laws...>> {
     const auto rest = std::ranges::unique(all, {}, &LawInfo::name);
     all.erase(rest.begin(), rest.end());
     return all;
+  }
+
+  static std::vector<std::string_view> variables() {
+    std::vector<std::string_view> names;
+    const auto add = [&](std::string_view name) {
+      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+    };
+    (std::for_each(Laws::state_names.begin(), Laws::state_names.end(), add), ...);
+    return names;
   }
 
   template <class ConcreteLaw>
@@ -41,6 +51,8 @@ std::span<const LawInfo> law_infos() {
   static const std::vector<LawInfo> infos = Table<Law>::infos();
   return infos;
 }
+
+std::vector<std::string_view> law_variables() { return Table<Law>::variables(); }
 
 const LawInfo* find_law(std::string_view model) {
   const auto found = std::ranges::find(law_infos(), model, &LawInfo::name);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/printable.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/case_changes.hpp"
 #include "cairn/io/result_files.hpp"
@@ -46,7 +47,7 @@ std::unique_ptr<Checkpoint> open_latest(const fs::path& out, MPI_Comm comm) {
     try {
       return std::make_unique<Checkpoint>(file, comm);
     } catch (const InputError& error) {
-      if (first) fmt::print(stderr, "warning: {}; the checkpoint before it is tried\n", error.what());
+      if (first) fmt::print(stderr, "warning: {}; the checkpoint before it is tried\n", printable(error.what()));
     }
   }
   throw InputError(fmt::format("--restart latest: {} holds {} checkpoint; run without --restart to start afresh",
@@ -118,12 +119,14 @@ std::string check_folder(const Case& c, const fs::path& out, const RunState& sta
 
 void print_restart(const Checkpoint& checkpoint, const std::vector<KeyChange>& changes, const fs::path& out) {
   const StepState& step = checkpoint.state().step;
-  fmt::print("going on from {}: step {}, time {} s\n", checkpoint.file().string(), step.steps, step.time);
+  std::string text =
+      fmt::format("going on from {}: step {}, time {} s\n", checkpoint.file().string(), step.steps, step.time);
   for (std::size_t i = 0; i < changes.size() && i < most_changes; ++i)
-    fmt::print("  changed: {}: {} -> {}\n", changes[i].key, changes[i].before, changes[i].after);
-  if (changes.size() > most_changes) fmt::print("  and {} more keys\n", changes.size() - most_changes);
+    text += fmt::format("  changed: {}: {} -> {}\n", changes[i].key, changes[i].before, changes[i].after);
+  if (changes.size() > most_changes) text += fmt::format("  and {} more keys\n", changes.size() - most_changes);
   if (!fs::exists(out / "history.csv"))
-    fmt::print("  {} holds no history.csv yet: it will begin after step {}\n", out.string(), step.steps);
+    text += fmt::format("  {} holds no history.csv yet: it will begin after step {}\n", out.string(), step.steps);
+  fmt::print("{}", printable(text, true));
   std::fflush(stdout);
 }
 
@@ -145,7 +148,6 @@ std::unique_ptr<Checkpoint> open_restart(const Case& c, const RunSettings& setti
 }
 
 std::string remove_later(const fs::path& out, const RunState& state, const fs::path& checkpoint) {
-  remove_leftovers(out);
   std::error_code ignored;
   fs::remove(out / failure_file, ignored);
   const std::pair<const char*, std::int64_t> kinds[] = {{"particles", state.particles.count},

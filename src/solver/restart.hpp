@@ -8,9 +8,6 @@
 
 namespace cairn {
 
-/// The points at the moment of a failure, which a run that goes on leaves behind.
-inline constexpr const char* failure_file = "failure_particles.vtkhdf";
-
 /// The checkpoint that the settings ask for, checked against the case and the folder; none without --restart. Says on
 /// rank 0 what it goes on from and which keys of the case changed. Changes nothing on disk. Collective.
 /// \throws InputError on every rank

@@ -5,6 +5,7 @@
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/case_changes.hpp"
+#include "cairn/io/case_folder.hpp"
 #include "cairn/io/progress.hpp"
 #include "cairn/io/result_files.hpp"
 #include "cairn/io/table_file.hpp"
@@ -132,7 +133,8 @@ class Run {
       goes_on = from != nullptr && fs::exists(settings_.out / "history.csv");
       if (settings_.overwrite) error = remove_results(settings_.out);
       if (goes_on) error = remove_later(settings_.out, from->state(), from->file());
-      if (error.empty()) error = replace_file(settings_.out / "case.toml", case_.resolved);
+      remove_leftovers(settings_.out);
+      if (error.empty()) error = write_case_files(case_, settings_.out);
       if (error.empty()) tables_.open(from ? &from->state() : nullptr);
       if (error.empty()) error = tables_.error();
     }

@@ -7,7 +7,16 @@ namespace cairn {
 
 namespace {
 
-constexpr std::array signals = {SIGTERM, SIGINT, SIGUSR1};
+struct Named {
+  int number;
+  const char* name;
+};
+constexpr std::array<Named, 6> signals = {{{SIGTERM, "SIGTERM"},
+                                           {SIGINT, "SIGINT"},
+                                           {SIGUSR1, "SIGUSR1"},
+                                           {SIGUSR2, "SIGUSR2"},
+                                           {SIGHUP, "SIGHUP"},
+                                           {SIGXCPU, "SIGXCPU"}}};
 
 // A handler can reach nothing else.
 volatile std::sig_atomic_t last_signal = 0;
@@ -23,17 +32,24 @@ StopSignals::StopSignals() {
   action.sa_handler = remember_signal;
   action.sa_flags = SA_RESTART;
   sigemptyset(&action.sa_mask);
-  for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals[i], &action, &previous_actions[i]);
+  for (std::size_t i = 0; i < signals.size(); ++i) {
+    sigaction(signals[i].number, &action, &previous_actions[i]);
+    // nohup: the terminal may go.
+    if (signals[i].number == SIGHUP && previous_actions[i].sa_handler == SIG_IGN)
+      sigaction(SIGHUP, &previous_actions[i], nullptr);
+  }
 }
 
 StopSignals::~StopSignals() {
-  for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals[i], &previous_actions[i], nullptr);
+  for (std::size_t i = 0; i < signals.size(); ++i) sigaction(signals[i].number, &previous_actions[i], nullptr);
 }
 
 int StopSignals::received() const { return last_signal; }
 
 const char* signal_name(int signal) {
-  return signal == SIGTERM ? "SIGTERM" : signal == SIGINT ? "SIGINT" : signal == SIGUSR1 ? "SIGUSR1" : "a signal";
+  for (const Named& known : signals)
+    if (known.number == signal) return known.name;
+  return "a signal";
 }
 
 }  // namespace cairn

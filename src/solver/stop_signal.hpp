@@ -1,5 +1,6 @@
 #pragma once
-/// Signals that ask a run to stop: SIGTERM, SIGINT and SIGUSR1.
+/// Signals that ask a run to stop: SIGTERM, SIGINT, SIGUSR1, SIGUSR2, SIGHUP (unless it is ignored, as under nohup) and
+/// SIGXCPU.
 
 namespace cairn {
 

@@ -46,6 +46,8 @@ left = { type = "wall" }
 history = { every = 1 }
 """
 
+END = BASE.count("\n") + 1  # number of a line that follows
+
 GRAINS = '[[grains]]\nfile = "pack.csv"\nmaterial = "soft"\n'
 
 PACK = """\
@@ -178,10 +180,24 @@ CASES = [
          "fixed or wall"),
     case("schedule_zero", "every = 1", "every = 0", "every", "output.history.every", "at least 1"),
     Bad("duplicate_key", ["case.toml:10: ", "TOML", "end"], {"case.toml": changed("cfl = 0.4", "end = 0.2")}),
+    Bad("long_key", [f"case.toml:{END}: ", "TOML", "more than 32 parts"],
+        {"case.toml": BASE + "a" + ".a" * 50_000 + " = 1\n"}),
+    Bad("long_table", [f"case.toml:{END}: ", "more than 32 parts"],
+        {"case.toml": BASE + "[a" + ".'a.#'" * 50_000 + "]\n"}),
+    Bad("long_inline", [f"case.toml:{END}: ", "more than 32 parts"],
+        {"case.toml": BASE + "b = { c = 1.5, a" + '."a"' * 50_000 + " = 1 }\n"}),
+    Bad("escape_sequences", [f"case.toml:{END}: ", "?[2J"], {"case.toml": BASE + '["\\u001b[2J\\u009b1m"]\na = 1\n'}),
     Bad("syntax", ["case.toml:9: ", "TOML"], {"case.toml": changed("end = 0.1", "end = ")}),
     Bad("all_at_once",
         ["case.toml:6: domain.cells", "case.toml:10: time.cfl", "case.toml:18: materials.soft.density", "3 errors"],
         {"case.toml": BASE.replace("[20, 20]", "20.5").replace("cfl = 0.4", "cfl = 2").replace("1000.0", "0.0")}),
+    Bad("no_point", ["case.toml:21: body 0 holds no material point", "smaller cells"],
+        {"case.toml": changed('type = "disk", centre = [0.3, 0.5], radius = 0.15',
+                              'type = "box", lower = [0.2, 0.505], upper = [0.8, 0.510]')}),
+    table("grain_no_point", "x,y,r\n0.5,0.8,0.1\n0.5,0.55,0.002\n", 3, "body 3 holds no material point"),
+    case("crossing_polygon", 'type = "disk", centre = [0.3, 0.5], radius = 0.15',
+         'type = "polygon", points = [[0.1,0.1],[0.9,0.9],[0.9,0.1],[0.1,0.8]]', "polygon", "bodies.0.shape.points",
+         "[0.1, 0.1] and [0.9, 0.1] cross or touch", "order"),
     added("unknown_field", 'particles = { every = 1, fields = ["temperature"] }\n', "temperature",
           "output.particles.fields",
           "choose from velocity"),
@@ -193,6 +209,9 @@ CASES = [
           "no body reaches"),
     added("pair_material", '[[contact.pair]]\nmaterials = ["soft", "hard"]\n', "hard", "contact.pair.0.materials",
           "known are soft, wall"),
+    added("pair_wall_or_material", '[materials.wall]\nmodel = "rigid"\ndensity = 1.0\n'
+          '[[contact.pair]]\nmaterials = ["soft", "wall"]\n', '["soft", "wall"]', "contact.pair.0.materials",
+          '"wall" is a material here'),
     added("unknown_partition", '[parallel]\npartition = "metsi"\n', "metsi", "parallel.partition",
           "metis, round_robin"),
     added("grain_table_missing", GRAINS, "pack.csv", "grains.0.file", "there is no file"),
@@ -208,6 +227,8 @@ CASES = [
     table("grain_columns", "x,y,r\n0.5,0.9\n", 2, "has 2 values", "3 columns"),
     table("grain_material", "x,y,r,material\n0.5,0.9,0.05,sfot\n", 2, "material: ", "known are soft"),
     table("grain_outside", "x,y,r\n0.5,0.9,0.05\n0.5,1.9,0.05\n", 3, "outside the domain"),
+    Bad("grain_utf16", ["pack.csv: ", "UTF-16", "UTF-8"],
+        {"case.toml": BASE + GRAINS, "pack.csv": "\ufeffx,y,r\n0.5,0.8,0.1\n".encode("utf-16-le")}),
     table("grain_table_empty", "", 1, "header"),
     table("grain_table_no_rows", "x,y,r\n", 1, "no grains"),
     table("grain_huge_line", "x,y,r\n" + "9" * 1_000_000 + "\n", 2, "has 1 values"),
@@ -230,6 +251,9 @@ CASES = [
     override("set_word_for_boolean", "solver.spin", "yes", "is a string", "true or false"),
     override("set_index", "bodies.5.velocity", "[0.0, 1.0]", "2 entries"),
     override("set_inside_value", "time.end.more", "1", "plain value"),
+    Bad("set_long_key", ["--set a.a.a", "a key of 20001 parts"], {"case.toml": BASE},
+        ["run", "case.toml", "--out", "out", "--set", "a" + ".a" * 20_000 + "=1"]),
+    override("set_long_value", "contact", "{ a" + ".a" * 20_000 + " = 1 }", "not a TOML value"),
     override("set_two_values", "time.steps", "1\nx = 2", "not a TOML value"),
     usage("set_no_value", ["run", "case.toml", "--out", "out", "--set", "time.steps"], "--set time.steps", "KEY=VALUE"),
     usage("no_command", []),
@@ -272,6 +296,11 @@ class Warning_:
 
 
 WARNINGS = [
+    Warning_("byte_order_marks", [], {"case.toml": "\ufeff" + BASE + GRAINS,
+                                     "pack.csv": "\ufeffx,y,r\r\n0.5,0.87,0.1\r\n"}),
+    Warning_("closed_polygon", [],
+             {"case.toml": changed('type = "disk", centre = [0.3, 0.5], radius = 0.15',
+                                   'type = "polygon", points = [[0.1,0.1],[0.4,0.1],[0.3,0.2],[0.4,0.4],[0.1,0.1]]')}),
     Warning_("overlap", ["warning: ", "case.toml:21", "overlaps body 1", "1 pairs"],
              {"case.toml": changed("centre = [0.7, 0.5]", "centre = [0.5, 0.5]")}),
     Warning_("periodic_overlap", ["warning: ", "overlaps", "1 pairs"],
@@ -311,6 +340,8 @@ def check_bad(bad, scratch, cairn):
         problems += [f"{ranks} ranks: '{text}' is not in the report" for text in bad.expect if text not in report]
         if not report:
             problems.append(f"{ranks} ranks: no report")
+        if any(ord(c) < 32 and c != "\n" or 127 <= ord(c) < 160 for c in report):
+            problems.append(f"{ranks} ranks: control characters in the report")
         for trace in ("terminate called", "Signal:", "[ 0]", "what():"):
             if trace in report:
                 problems.append(f"{ranks} ranks: stack trace")

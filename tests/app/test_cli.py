@@ -7,6 +7,7 @@ import concurrent.futures
 import os
 import re
 import resource
+import shutil
 import subprocess
 import sys
 import time
@@ -141,11 +142,10 @@ def test_progress_into_a_file(cairn: Program, here: Path):
 def test_overwrite(cairn: Program, here: Path):
     out, few = here / "out", sets({"time.steps": 2})
     out.mkdir()
-    (out / "case.toml").write_text("not a result\n")
     (out / "notes.txt").write_text("mine\n")
     run = ("run", DISKS, "--out", "out")
-    expect_code(cairn(*run, *sets(ALL_OUTPUTS), *few, cwd=here), 0)  # neither of the two files is a result
-    (out / "checkpoint_000009.h5").write_text("of an earlier run")
+    expect_code(cairn(*run, *sets(ALL_OUTPUTS), *few, cwd=here), 0)  # the notes are no result
+    shutil.copy(out / "grains_000000.h5", out / "checkpoint_000009.h5")  # of an earlier run
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     for ranks in (1, 2):
         done = cairn(*run, *few, ranks=ranks, cwd=here)
@@ -155,8 +155,9 @@ def test_overwrite(cairn: Program, here: Path):
         expect_code(cairn(*run, *few, "--overwrite", *tiny, ranks=ranks, cwd=here), 2, "no material point")
         expect(before == {path.name: path.read_bytes() for path in out.iterdir()}, "a refused run changed results")
     expect_code(cairn(*run, "--overwrite", "--restart", "latest", cwd=here), 2, "--overwrite", "--restart")
+    earlier = (out / "grains_000000.h5").read_bytes()
     for ranks in (1, 2):
-        (out / "grains_000077.h5").write_text("of an earlier run")
+        (out / "grains_000077.h5").write_bytes(earlier)
         plain = {"output.particles": "{}", "output.track": "[]"}
         expect_code(cairn(*run, *few, "--overwrite", *sets(plain), ranks=ranks, cwd=here), 0)
         expect(names(out) == ["case.toml", "history.csv", "notes.txt"], names(out))

@@ -1,4 +1,5 @@
 #include "../support/case_file.hpp"
+#include "cairn/io/case_folder.hpp"
 
 namespace cairn {
 namespace {
@@ -113,7 +114,9 @@ history = {}
 checkpoint = { interval_wall = 600, keep = 5 }
 track = [2, 0]
 )");
-  const Case again = read_case(write("again.toml", c.resolved));
+  fs::create_directory(folder_ / "results");
+  ASSERT_EQ(write_case_files(c, folder_ / "results"), "");  // with a copy of the table
+  const Case again = read_case(folder_ / "results" / "case.toml");
   EXPECT_EQ(c.resolved, again.resolved);
   // The text holds all of the case, so that it is enough to see that what was read is right.
   EXPECT_EQ(c.title, "quotes \" and \\ and \n");
@@ -139,7 +142,7 @@ track = [2, 0]
   EXPECT_EQ(again.bodies[1].material, 1);
   EXPECT_EQ(again.bodies[2].velocity, Vec3(3, 4, 0));
   EXPECT_EQ(again.bodies[2].group, "corner");
-  EXPECT_EQ(again.bodies[3].source, (folder_ / "pack.csv").string() + ":3");
+  EXPECT_EQ(again.bodies[3].source, (folder_ / "results" / "case_grains_0.csv").string() + ":4");
   ASSERT_EQ(again.drives.size(), 3u);
   EXPECT_EQ(again.drives[0].ids, (std::vector{1, 2}));
   EXPECT_EQ(again.drives[2].group, "g");

@@ -1,6 +1,7 @@
 // Materials and initial pressures of the case file: lists of parameters, plane stress, what cannot be.
 
 #include "../support/case_file.hpp"
+#include "cairn/io/case_folder.hpp"
 
 namespace cairn {
 namespace {
@@ -61,7 +62,9 @@ TEST_F(CaseFile, InitialPressureOfBodiesAndGrains) {
   const Case c = read(text);
   EXPECT_EQ(c.bodies.at(0).initial_pressure, 1.5e3);
   EXPECT_EQ(c.bodies.at(1).initial_pressure, -20.0);
-  const Case again = read_case(write("again.toml", c.resolved));
+  fs::create_directory(folder_ / "results");
+  ASSERT_EQ(write_case_files(c, folder_ / "results"), "");
+  const Case again = read_case(folder_ / "results" / "case.toml");
   EXPECT_EQ(again.bodies.at(0).initial_pressure, 1.5e3);
   EXPECT_EQ(again.bodies.at(1).initial_pressure, -20.0);
 }

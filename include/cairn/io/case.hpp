@@ -2,6 +2,7 @@
 /// The case: everything a run needs, parsed, checked and with all defaults filled in (INTERFACE: docs/case-file.md).
 /// Vectors have three components whatever the dimension; z is 0 in 2D. SI units.
 
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -81,6 +82,13 @@ struct Output {
   std::vector<int> track;  // bodies of bodies.csv
 };
 
+/// A grain table that the case reads, and the name of its copy beside the case.toml of the results.
+struct CaseTable {
+  std::filesystem::path file;
+  std::string copy;
+  std::uint64_t checksum = 0;  // of its bytes, as they were read (checksum.hpp)
+};
+
 struct Case {
   std::string title;
   std::filesystem::path file;  // where it was read from; grain tables are relative to its folder
@@ -95,7 +103,8 @@ struct Case {
   Output output;
   ParallelOptions parallel;
   std::vector<std::string> warnings;
-  std::string resolved;  // the text of case.toml: every default and override filled in
+  std::string resolved;  // the text of case.toml: every default and override filled in, grain tables by their copies
+  std::vector<CaseTable> tables;
 };
 
 /// True where the drive selects the body, which has the number `index`.

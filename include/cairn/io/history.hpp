@@ -37,7 +37,7 @@ std::string check_prefix(const std::filesystem::path& file, const std::vector<st
 class CsvWriter {
  public:
   CsvWriter() = default;
-  /// Replaces `file`.
+  /// Replaces a `file` of an earlier run; one that begins otherwise is an error.
   CsvWriter(std::filesystem::path file, std::vector<std::string> columns);
   /// Goes on with `file` at `from`: what lies behind is cut off.
   CsvWriter(std::filesystem::path file, std::vector<std::string> columns, const CsvPosition& from);

@@ -9,15 +9,20 @@
 
 namespace cairn {
 
+/// The points at the moment of a failure.
+inline constexpr const char* failure_file = "failure_particles.vtkhdf";
+
 /// True for the names of result files: history.csv, bodies.csv, particles_N.vtkhdf, grains_N.h5, contacts_N.h5 and
-/// checkpoint_N.h5 with N a number, and indices of series, *.hdf.series. The case as it was run, case.toml, is none.
+/// checkpoint_N.h5 with N a number, particles.hdf.series and failure_particles.vtkhdf. What a run reads again,
+/// case.toml and the copies of its grain tables, is none.
 bool is_result_name(const std::string& name);
 
 /// The result files in `folder`, sorted; none if there is no such folder. Not collective.
 /// \throws InputError if the folder cannot be read.
 std::vector<std::filesystem::path> find_results(const std::filesystem::path& folder);
 
-/// Removes exactly the result files in `folder`; returns the first error, empty if there was none. Not collective.
+/// Removes exactly the result files in `folder` that this program wrote; returns the first error, which other files
+/// with such names are (own_files.hpp). Not collective.
 std::string remove_results(const std::filesystem::path& folder);
 
 struct NumberedFile {
@@ -55,8 +60,8 @@ class UnflushedFiles {
   std::vector<std::filesystem::path> files_;
 };
 
-/// Gives a file this text, all of it or none: it is written under a temporary name, flushed to disk and renamed.
-/// Returns the error, empty if none. Not collective.
+/// Gives a file this text, all of it or none: it is written under a temporary name, flushed to disk and renamed. What
+/// is there is replaced, whoever wrote it (own_files.hpp). Returns the error, empty if none. Not collective.
 std::string replace_file(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace cairn
