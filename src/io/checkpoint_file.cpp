@@ -74,7 +74,7 @@ void CheckpointReader::require(const std::string& problem) const {
 
 std::int64_t CheckpointReader::rows_of(const std::string& column) const {
   const std::int64_t rows = table_->rows_of(column);
-  require(rows >= 0 ? "" : "it lacks the column " + column);
+  require(rows >= 0 ? "" : fmt::format("it lacks the column {}, or that has more rows than the file holds", column));
   return rows;
 }
 

@@ -50,6 +50,7 @@ bool read_number(hid_t object, const std::string& name, T& value) {
 void prepare() {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   ::setenv("HDF5_USE_FILE_LOCKING", "BEST_EFFORT", 0);  // file systems of clusters often have no locks
+  H5Lunregister(H5L_TYPE_EXTERNAL);                     // a file is what it holds: nothing is opened that it names
 }
 
 std::string error_text() {
@@ -86,6 +87,8 @@ bool read_attribute(hid_t object, const std::string& name, std::string& value) {
   const Handle type(H5Aget_type(attribute), H5Tclose), space(H5Aget_space(attribute), H5Sclose);
   if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0 || H5Sget_simple_extent_npoints(space) != 1)
     return false;
+  constexpr std::size_t longest = 1 << 20;
+  if (H5Tget_size(type) > longest) return false;
   std::vector<char> text(H5Tget_size(type) + 1, '\0');
   if (H5Aread(attribute, type, text.data()) < 0) return false;
   value = text.data();

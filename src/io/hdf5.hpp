@@ -33,8 +33,8 @@ class Handle {
   herr_t (*closer_)(hid_t) = nullptr;
 };
 
-/// Stops HDF5 from printing its error stack, and from insisting on locks. Call before the first use of HDF5 by a
-/// function that reports errors itself.
+/// Stops HDF5 from printing its error stack, from insisting on locks, and from following links to other files. Call
+/// before the first use of HDF5 by a function that reports errors itself.
 void prepare();
 
 /// What the HDF5 call that just failed says was wrong, with the system's message if there is one. Call it before any

@@ -50,6 +50,8 @@ const std::map<std::string_view, std::string_view> units = {
 constexpr std::array structural = {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds",
                                    "Connectivity",   "Offsets",       "Types"};
 
+constexpr int deepest = 64;  // groups within groups
+
 struct Listing {
   std::filesystem::path file;
   std::set<haddr_t> seen;                        // addresses: links name an object again
@@ -115,14 +117,29 @@ std::string describe_range(const Listing& listing, const std::string& name, hid_
                      bad.empty() ? "" : ", ", bad);
 }
 
+/// Why the values of a dataset are not read; empty where they are.
+std::string reason_not_to_read(const Listing& listing, hid_t dataset, hid_t space, hid_t type) {
+  const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+  const H5D_layout_t layout = H5Pget_layout(properties);
+  if (layout == H5D_VIRTUAL || (layout == H5D_CONTIGUOUS && H5Pget_external_count(properties) > 0))
+    return "in other files, not read";
+  std::error_code ignored;
+  constexpr double densest = 64;  // bytes of values in a byte of a compressed file
+  const double bytes =
+      static_cast<double>(H5Sget_simple_extent_npoints(space)) * static_cast<double>(H5Tget_size(type));
+  const auto there = static_cast<double>(std::filesystem::file_size(listing.file, ignored));
+  return bytes > densest * there ? "more values than the file can hold, not read" : "";
+}
+
 void describe_dataset(Listing& listing, const std::string& path, const std::string& name, hid_t dataset) {
   const Handle space(H5Dget_space(dataset), H5Sclose), type(H5Dget_type(dataset), H5Tclose);
   std::vector<hsize_t> extent(static_cast<std::size_t>(std::max(0, H5Sget_simple_extent_ndims(space))));
   H5Sget_simple_extent_dims(space, extent.data(), nullptr);
-  std::string range;
-  if (H5Tget_class(type) == H5T_FLOAT)
+  std::string range = reason_not_to_read(listing, dataset, space, type);
+  const bool readable = range.empty();
+  if (readable && H5Tget_class(type) == H5T_FLOAT)
     range = describe_range<double>(listing, path, dataset, extent);
-  else if (H5Tget_class(type) == H5T_INTEGER)
+  else if (readable && H5Tget_class(type) == H5T_INTEGER)
     range = describe_range<std::int64_t>(listing, path, dataset, extent);
   const std::string shape = extent.empty() ? "1" : fmt::format("{}", fmt::join(extent, " x "));
   const bool column = path == name || path == "VTKHDF/PointData/" + name;  // named as users name it
@@ -139,11 +156,25 @@ std::vector<std::string> entries_of(hid_t group) {
   return names;
 }
 
+/// What a link is that leads out of the file, or to nothing; empty for one that is followed.
+std::string unfollowed_link(hid_t group, const std::string& name) {
+  H5L_info_t link;
+  if (H5Lget_info(group, name.c_str(), &link, H5P_DEFAULT) < 0) return "broken link";
+  if (link.type == H5L_TYPE_HARD) return {};
+  if (link.type == H5L_TYPE_SOFT)
+    return H5Oexists_by_name(group, name.c_str(), H5P_DEFAULT) > 0 ? "" : "link to nothing";
+  return "link to another file";
+}
+
 /// Lists the datasets of a group, then those of the groups in it.
-void describe_group(Listing& listing, hid_t group, const std::string& prefix) {
+void describe_group(Listing& listing, hid_t group, const std::string& prefix, int depth = 0) {
   std::vector<std::string> groups;
   for (const auto& name : entries_of(group)) {
     const std::string path = prefix + name;
+    if (const std::string link = unfollowed_link(group, name); !link.empty()) {
+      listing.rows.push_back({path, "", link, "not followed"});
+      continue;
+    }
     errno = 0;
     const Handle object(H5Oopen(group, name.c_str(), H5P_DEFAULT), H5Oclose);
     H5O_info_t info;
@@ -157,8 +188,12 @@ void describe_group(Listing& listing, hid_t group, const std::string& prefix) {
     }
   }
   for (const auto& name : groups) {
+    if (depth == deepest) {
+      listing.rows.push_back({prefix + name, "", "group", "too deep, not read"});
+      continue;
+    }
     const Handle inner(H5Gopen2(group, name.c_str(), H5P_DEFAULT), H5Gclose);
-    describe_group(listing, inner, prefix + name + "/");
+    describe_group(listing, inner, prefix + name + "/", depth + 1);
   }
 }
 

@@ -49,12 +49,15 @@ std::string check_shape(hid_t dataset, const std::string& column, std::int64_t r
 /// Where in the file the values of a dataset lie, one after the other as in memory: -1 where they do not. Without rows
 /// they lie nowhere.
 template <class T>
-std::int64_t place_of(hid_t dataset) {
+std::int64_t place_of(hid_t dataset, std::int64_t file_bytes) {
   const Handle space(H5Dget_space(dataset), H5Sclose), type(H5Dget_type(dataset), H5Tclose);
   if (H5Tequal(type, hdf5::native_type<T>()) <= 0) return -1;
   if (H5Sget_simple_extent_npoints(space) == 0) return 0;
   const haddr_t place = H5Dget_offset(dataset);
-  return place == HADDR_UNDEF ? -1 : static_cast<std::int64_t>(place);
+  if (place == HADDR_UNDEF || place >= static_cast<haddr_t>(file_bytes)) return -1;
+  const auto values = static_cast<double>(H5Sget_simple_extent_npoints(space));
+  const double end = static_cast<double>(place) + values * sizeof(T);
+  return end <= static_cast<double>(file_bytes) ? static_cast<std::int64_t>(place) : -1;
 }
 
 }  // namespace
@@ -68,8 +71,9 @@ void TableReader::State::read(const std::string& column, int components, const R
   require_input(dataset.valid() ? check_shape(dataset, column, wanted.total_rows, components)
                                 : "it has no column " + column);
 
-  const std::int64_t row_bytes = components * static_cast<std::int64_t>(sizeof(T)), place = place_of<T>(dataset);
-  require_input(place >= 0 ? "" : fmt::format("column {} is not stored as one piece of this type", column));
+  const std::int64_t row_bytes = components * static_cast<std::int64_t>(sizeof(T)),
+                     place = place_of<T>(dataset, data.size());
+  require_input(place >= 0 ? "" : fmt::format("column {} is not stored as one piece of this type in the file", column));
   auto* bytes = reinterpret_cast<char*>(values.data());
   std::string error;
   for (const auto& block : merged_blocks(wanted)) {
@@ -112,8 +116,13 @@ std::int64_t TableReader::rows_of(const std::string& column) const {
   const Handle dataset(H5Dopen2(state_->handle, column.c_str(), H5P_DEFAULT), H5Dclose);
   const Handle space(dataset.valid() ? H5Dget_space(dataset) : H5I_INVALID_HID, H5Sclose);
   hsize_t extent[H5S_MAX_RANK] = {0};
-  return space.valid() && H5Sget_simple_extent_dims(space, extent, nullptr) >= 1 ? static_cast<std::int64_t>(extent[0])
-                                                                                 : -1;
+  if (!space.valid() || H5Sget_simple_extent_dims(space, extent, nullptr) < 1) return -1;
+  // A file can say that it has more values than it holds bytes.
+  const Handle type(H5Dget_type(dataset), H5Tclose);
+  const double bytes =
+      static_cast<double>(H5Sget_simple_extent_npoints(space)) * static_cast<double>(H5Tget_size(type));
+  const auto most = static_cast<double>(state_->data.size());
+  return bytes <= most && static_cast<double>(extent[0]) <= most ? static_cast<std::int64_t>(extent[0]) : -1;
 }
 
 bool TableReader::attribute(const std::string& name, double& value) const {

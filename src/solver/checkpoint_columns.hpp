@@ -40,6 +40,7 @@ inline int most_states(const std::vector<SolverMaterial>& materials) {
 inline constexpr int image_components = 3;
 inline constexpr const char* checksums_name =
     "checksums";  // for each patch, one of each column in the order of writing
+inline constexpr const char* numbers_checksum_name = "numbers_checksum";  // of all else
 
 /// Rows of every patch in some table.
 using Counts = std::vector<std::int64_t>;

@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
-#include <numeric>
+#include <limits>
 #include <sstream>
 #include <type_traits>
 
 #include "cairn/io/checksum.hpp"
 #include "cairn/solver/checkpoint.hpp"
+#include "checkpoint_checks.hpp"
 #include "checkpoint_columns.hpp"
 
 namespace cairn {
@@ -31,6 +33,9 @@ class ColumnReader {
   template <class T>
   std::vector<T> read(const std::string& name, int components, const Counts& counts) {
     const RowBlocks rows = rows_of(patches_, counts);
+    reader_.require(reader_.rows_of(name) == rows.total_rows
+                        ? ""
+                        : fmt::format("its column {} does not have the {} rows of its patches", name, rows.total_rows));
     std::vector<T> values(static_cast<std::size_t>(rows.local_rows() * components));
     reader_.table().read(name, components, rows, std::span(values));
     std::size_t at = 0;
@@ -90,12 +95,18 @@ void read_pieces(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
     for (std::int64_t i = 0; i < layout.pieces[patch.id]; ++i, ++row) {
       const bool known = body[row] >= 0 && body[row] < std::ssize(bodies);
       in.require(known, fmt::format("it holds a body {}; the case has {} bodies", body[row], bodies.size()));
-      if (!known) continue;
+      const bool ascending = patch.pieces.empty() || patch.pieces.back().body < body[row];
+      in.require(ascending, fmt::format("the bodies of patch {} are not in their order", patch.id));
+      const bool fits = count[row] > 0 && count[row] <= layout.points[patch.id] - points &&
+                        count[row] <= std::numeric_limits<int>::max();
+      in.require(fits, fmt::format("body {} in patch {} has {} points; {} are left there", body[row], patch.id,
+                                   count[row], layout.points[patch.id] - points));
+      if (!known || !ascending || !fits) continue;
       const auto& material = materials[bodies[body[row]].material];
       in.require(states[row] == std::ssize(material.state_names),
                  fmt::format("body {} has {} state variables, material {} has {}", body[row], states[row],
                              material.name, material.state_names.size()));
-      patch.pieces.emplace_back(body[row], states[row]);
+      patch.pieces.emplace_back(body[row], static_cast<int>(material.state_names.size()));
       patch.pieces.back().points.resize(static_cast<int>(count[row]));
       points += count[row];
     }
@@ -106,15 +117,25 @@ void read_pieces(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
 }
 
 template <int Dim>
-void read_contacts(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout) {
+void read_contacts(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout,
+                   std::size_t body_count) {
   constexpr std::size_t size = ContactSum<Dim>::size;
   const auto pairs = in.template read<std::int32_t>("contact_bodies", 2, layout.contacts);
   const auto sums = in.template read<double>("contact_sums", size, layout.contacts);
   in.settle();
   std::size_t row = 0;
   for (auto& patch : patches)
-    for (std::int64_t i = 0; i < layout.contacts[patch.id]; ++i, ++row)
-      std::copy_n(&sums[row * size], size, patch.contacts[{pairs[2 * row], pairs[2 * row + 1]}].values.begin());
+    for (std::int64_t i = 0; i < layout.contacts[patch.id]; ++i, ++row) {
+      const std::pair<int, int> pair(pairs[2 * row], pairs[2 * row + 1]);
+      in.require(patch.contacts.empty() || patch.contacts.rbegin()->first < pair,
+                 fmt::format("the contacts of patch {} are not in their order", patch.id));
+      ContactSum<Dim> sum;
+      std::copy_n(&sums[row * size], size, sum.values.begin());
+      const std::string problem = problem_of(pair, sum, body_count);
+      in.require(problem.empty(), problem);
+      patch.contacts[pair] = sum;
+    }
+  in.settle();
 }
 
 template <int Dim>
@@ -128,8 +149,11 @@ void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
         for (int p = 0; p < piece.points.size(); ++p, ++row) {
           piece.points.ids()[p] = ids[row];
           Image image{};
-          for (int i = 0; i < image_components; ++i)
-            image[i] = static_cast<std::int16_t>(images[row * image_components + i]);
+          for (int i = 0; i < image_components; ++i) {
+            const std::int32_t crossings = images[row * image_components + i];
+            image[i] = static_cast<Image::value_type>(crossings);
+            in.require(image[i] == crossings, "it holds more crossings of a periodic boundary than a point can have");
+          }
           piece.points.images()[p] = image;
         }
   }
@@ -149,6 +173,22 @@ void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
   in.settle();
 }
 
+/// Each point is there once, and where it can be.
+template <int Dim>
+void check_points(ColumnReader<Dim>& in, const std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice) {
+  std::vector<std::int64_t> ids;
+  for (const auto& patch : patches)
+    for (const auto& piece : patch.pieces) {
+      const std::string problem = problem_of(piece, lattice, patch.id);
+      in.require(problem.empty(), problem);
+      ids.insert(ids.end(), piece.points.ids().begin(), piece.points.ids().end());
+    }
+  std::ranges::sort(ids);
+  const auto twice = std::ranges::adjacent_find(ids);
+  in.require(twice == ids.end(), fmt::format("it holds point {} twice", twice == ids.end() ? 0 : *twice));
+  in.settle();
+}
+
 RunState read_state(const CheckpointReader& reader) {
   RunState state;
   for_each_number(state, [&]<class T>(const std::string& name, T& value) {
@@ -163,10 +203,21 @@ RunState read_state(const CheckpointReader& reader) {
   state.step.time = reader.table().time(), state.step.steps = reader.table().step();
   const auto times = reader.column<double>("series_time");
   std::istringstream names(reader.text("series_names"));
-  std::string name;
-  for (const double time : times)
-    if (std::getline(names, name)) state.series.push_back({name, time});
+  std::size_t listed = 0;
+  for (std::string name; std::getline(names, name); ++listed)
+    if (listed < times.size()) state.series.push_back({name, times[listed]});
+  reader.require(listed == times.size() ? "" : "its list of particle files has not as many names as times");
+  reader.require(problem_of(state));
   return state;
+}
+
+/// The numbers and texts are those that were written together.
+void check_numbers(const CheckpointReader& reader, const RunState& state, const std::string& case_text) {
+  std::int64_t sum = 0;
+  reader.read(numbers_checksum_name, sum);
+  reader.require(std::bit_cast<std::uint64_t>(sum) == checksum_of(state, case_text)
+                     ? ""
+                     : "damaged: its numbers, case or list of particle files do not match their checksum");
 }
 
 }  // namespace
@@ -179,9 +230,14 @@ Checkpoint::Checkpoint(const std::filesystem::path& file, MPI_Comm comm)
       points_(reader_.column<std::int64_t>("patch_points")),
       pieces_(reader_.column<std::int64_t>("patch_pieces")),
       contacts_(reader_.column<std::int64_t>("patch_contacts")) {
-  const bool consistent = points_.size() == pieces_.size() && points_.size() == contacts_.size() &&
-                          std::accumulate(points_.begin(), points_.end(), std::int64_t{0}) == reader_.table().rows();
+  check_numbers(reader_, state_, case_text_);
+  const bool consistent = points_.size() == pieces_.size() && points_.size() == contacts_.size();
   reader_.require(consistent ? "" : "damaged: the tables of patches do not fit together");
+  const std::int64_t rows = reader_.rows_of("id");
+  reader_.require(rows == reader_.table().rows() ? "" : "damaged: it has more or fewer points than it says");
+  reader_.require(problem_of("patch_points", points_, rows));
+  reader_.require(problem_of("patch_pieces", pieces_, reader_.rows_of("piece_body")));
+  reader_.require(problem_of("patch_contacts", contacts_, reader_.rows_of("contact_bodies")));
 }
 
 template <int Dim>
@@ -195,7 +251,7 @@ void Checkpoint::check_layout(const Lattice<Dim>& lattice) const {
 }
 
 template <int Dim>
-void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const std::vector<Body>& bodies,
+void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
                       const std::vector<SolverMaterial>& materials) const {
   const Layout layout{points_, pieces_, contacts_};
   const int states = most_states(materials);
@@ -204,15 +260,16 @@ void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const std::vector<Body>&
   ColumnReader<Dim> in(reader_, patches, points_.size(), columns);
   read_ledgers(in, patches);
   read_pieces(in, patches, layout, bodies, materials);
-  read_contacts(in, patches, layout);
+  read_contacts(in, patches, layout, bodies.size());
   read_points(in, patches, layout, states);
+  check_points(in, patches, lattice);
 }
 
 template void Checkpoint::check_layout(const Lattice<2>&) const;
 template void Checkpoint::check_layout(const Lattice<3>&) const;
-template void Checkpoint::fill(std::vector<Patch<2>>&, const std::vector<Body>&,
+template void Checkpoint::fill(std::vector<Patch<2>>&, const Lattice<2>&, const std::vector<Body>&,
                                const std::vector<SolverMaterial>&) const;
-template void Checkpoint::fill(std::vector<Patch<3>>&, const std::vector<Body>&,
+template void Checkpoint::fill(std::vector<Patch<3>>&, const Lattice<3>&, const std::vector<Body>&,
                                const std::vector<SolverMaterial>&) const;
 
 }  // namespace cairn

@@ -4,6 +4,7 @@
 
 #include "cairn/io/checksum.hpp"
 #include "cairn/solver/checkpoint.hpp"
+#include "checkpoint_checks.hpp"
 #include "checkpoint_columns.hpp"
 
 namespace cairn {
@@ -173,6 +174,7 @@ void write_checkpoint(const std::filesystem::path& file, const Simulation<Dim>& 
   writer.add("dimension", std::int64_t{Dim});
   write_state(writer, state, comm);
   writer.add_text("case", case_text);
+  writer.add(numbers_checksum_name, std::bit_cast<std::int64_t>(checksum_of(state, case_text)));
   ColumnWriter<Dim> out(writer, patches, layout.points.size());
   write_patches(out, patches, layout);
   write_points(out, patches, layout, states);

@@ -298,7 +298,7 @@ template <int Dim>
 void Simulation<Dim>::restore(const Checkpoint& from) {
   from.check_layout(lattice_);
   make_patches(from.points());
-  from.fill(patches_, bodies_, materials_);
+  from.fill(patches_, lattice_, bodies_, materials_);
   connect_patches();
   const StepState& state = from.state().step;
   time_ = state.time, dt_ = state.dt, steps_ = state.steps;

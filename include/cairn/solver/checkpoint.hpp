@@ -37,9 +37,10 @@ class Checkpoint {
   template <int Dim>
   void check_layout(const Lattice<Dim>& lattice) const;
   /// Gives this rank's patches (ascending, empty) their points, ledgers and contacts.
-  /// \throws InputError if the content does not match its checksums or the case's bodies and materials
+  /// \throws InputError if the content does not match its checksums or the case's bodies and materials, or is no state
+  /// of a run: counts, order, points that are not finite, inverted, there twice or not in their patch
   template <int Dim>
-  void fill(std::vector<Patch<Dim>>& patches, const std::vector<Body>& bodies,
+  void fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
             const std::vector<SolverMaterial>& materials) const;
 
  private:
