@@ -121,4 +121,4 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("column", "Column of disks collapses", "plain discrete element method of the same disks", runs,
-                  checks, draw, literal=(label(CELLS[0]),), forms=("cut",))
+                  checks, draw, literal=(label(CELLS[0]),), forms=("whole", "stand-off"))

@@ -1,7 +1,7 @@
-"""A plate pressed on a cylinder, in plane strain: width of the contact and pressure there, against Hertz.
+"""A plate pressed on a cylinder, in plane strain: width of the contact and pressure there.
 
-Both over the load, so that it does not matter from where the approach is counted; in plane strain it depends on the
-whole body and not on the contact alone.
+Over the load, against Hertz; over the approach from where the undeformed bodies touch, which in plane strain depends on
+the whole body, against finite elements that move with it.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from validation.checks import Check, holds, observed_order, record
+from validation.checks import Check, holds, near, observed_order, record
 from validation.closed_forms import HertzCylinder, plane_strain_modulus
 from validation.figures import Curve, Panel, draw_panels
+from validation.lagrangian_contact import at_approach
 from validation.problems import pressing
 from validation.runs import Run
 from validation.suite import Folders, Problem
 
 CELLS = (16, 32, 64)  # to a radius
+ACROSS, BAND = 4.5, 0.12  # of the half-width at the approach, from so many cells across the contact on
 HERTZ = HertzCylinder(pressing.RADIUS, plane_strain_modulus(pressing.YOUNGS, pressing.POISSON))
 
 
@@ -48,11 +50,25 @@ def measured(folders: Folders) -> dict[int, list[tuple[pressing.State, float, fl
     return found
 
 
+def at_the_approach(cells: int, state: pressing.State) -> list[Check]:
+    """Load and half-width against the Lagrangian reference."""
+    if not state.depth > 0:
+        return []
+    radius, right = pressing.RADIUS, at_approach(False, state.depth / pressing.RADIUS)
+    across = 2 * right.width * cells
+    case = f"R/{cells}, {across:.1f} cells across"
+    width = 2 * math.sqrt(state.second_moment)
+    return [near(case, "half-width b at the approach [m]", width, right.width * radius, BAND) if across >= ACROSS
+            else record(case, "half-width b at the approach [m]", width, right.width * radius),
+            record(case, "load P at the approach [N/m]", 2 * state.force, right.force * pressing.YOUNGS * radius)]
+
+
 def checks(folders: Folders) -> list[Check]:
     found, series = [], measured(folders)
     widths, peaks, depths = [], [], []
     for cells, rows in series.items():
         for state, load, width_error, peak_error in rows:
+            found += at_the_approach(cells, state)
             right = HERTZ.half_width(load)
             found += pressing.compare(f"R/{cells}", pressing.RADIUS / cells, right, [
                 ("half-width b [m]", right * (1 + width_error), right),
@@ -87,5 +103,6 @@ def draw(folders: Folders, out: Path) -> list[Path]:
     return [draw_panels(out / "cylinder.png", "Cylinder pressed by a plate, against Hertz", panels)]
 
 
-PROBLEM = Problem("cylinder", "Plate on a cylinder", "Hertz, plane strain; Johnson, Contact Mechanics, section 4.2",
-                  runs, checks, draw, literal=tuple(f"R/{cells}" for cells in CELLS), forms=("whole", "stand-off"))
+PROBLEM = Problem("cylinder", "Plate on a cylinder",
+                  "Lagrangian finite elements; Hertz, plane strain; Johnson, Contact Mechanics, section 4.2", runs,
+                  checks, draw, literal=tuple(f"R/{cells}" for cells in CELLS), forms=("whole", "stand-off"))

@@ -233,4 +233,5 @@ def draw(folders: Folders, out: Path) -> list[Path]:
 
 
 PROBLEM = Problem("rest", "Bodies at rest", "what is left alone comes to rest", runs, checks, draw,
-                  literal=("5 disks, 2 rows, mu 0.5",), forms=("approach", "traction", "cut", "bspline2"))
+                  literal=("5 disks, 2 rows, mu 0.5",),
+                  forms=("approach", "traction", "whole", "stand-off", "no filter"))
