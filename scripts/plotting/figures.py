@@ -136,7 +136,7 @@ def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -
         frames = [run.frame_at_shear(fraction) for fraction in FIGURE_7_SHEAR]
     except MissingData:
         frames = [run.frames[-1]]
-    values = [principal_stress_difference(frame.field("stress")) for frame in frames]
+    values = [principal_stress_difference(run.stress(frame)) for frame in frames]
     top = max(float(np.percentile(value, 99)) for value in values)
     figure, row = plt.subplots(1, len(frames), figsize=(7 * len(frames), 7), squeeze=False)
     extent = (run.lower[0], run.upper[0], run.lower[1], run.upper[1])
@@ -147,6 +147,7 @@ def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -
     bar = figure.colorbar(shown, ax=list(row[0]), shrink=0.75, pad=0.02)
     bar.set_label("principal stress difference [Pa]")
     summary["principal_stress_scale_Pa"] = top
+    summary["principal_stress_field"] = run.stress_name(frames[0])
     return [_save(figure, folder, "principal_stress.png")]
 
 

@@ -38,12 +38,12 @@ def film(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
 
 def _pictures(run: Run):
     """Each frame as an array (rows from the top x columns x 3) with even sides."""
-    stressed = run.dimension == 2 and all(frame.has("stress") for frame in run.frames)
+    stressed = run.dimension == 2 and all(frame.has(run.stress_name(frame)) for frame in run.frames)
     top = _stress_scale(run) if stressed else 0
     for frame in run.frames:
         panels = [grain_picture(run, frame, PIXELS)[0]]
         if stressed:
-            value = principal_stress_difference(frame.field("stress"))
+            value = principal_stress_difference(run.stress(frame))
             grey = (255 * raster.paint_values(owners(run, frame, PIXELS), value, top)).astype(np.uint8)
             panels.append(np.repeat(grey[..., None], 3, axis=2))
         picture = np.concatenate(panels, axis=1)[::-1]
@@ -56,4 +56,4 @@ def _pictures(run: Run):
 
 def _stress_scale(run: Run) -> float:
     """One scale for the whole film [Pa]: the largest 99th percentile of any frame."""
-    return max(float(np.percentile(principal_stress_difference(frame.field("stress")), 99)) for frame in run.frames)
+    return max(float(np.percentile(principal_stress_difference(run.stress(frame)), 99)) for frame in run.frames)

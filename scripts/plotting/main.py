@@ -36,10 +36,13 @@ def arguments() -> argparse.Namespace:
                         "difference of the in-plane principal stresses; a tenth of the largest stress is a start")
     parser.add_argument("--times", type=float, nargs="+", default=[], metavar="S",
                         help="with --fringes: the outputs nearest to these times [s]; default: all")
+    parser.add_argument("--raw-stress", action="store_true",
+                        help="show the points' stress as computed, also where the files hold the smooth field "
+                        "(stress_smooth), which pictures show otherwise")
     return parser.parse_args()
 
 
-def draw_fringes(path: Path, parameter: float, times: list[float]) -> int:
+def draw_fringes(path: Path, parameter: float, times: list[float], raw_stress: bool) -> int:
     """photoelastic.png of a result folder, or of one particle file, in the folder's pictures."""
     from photoelastic import photoelastic
 
@@ -48,6 +51,7 @@ def draw_fringes(path: Path, parameter: float, times: list[float]) -> int:
         return 2
     try:
         run = Run(path.parent if path.is_file() else path)
+        run.raw_stress = raw_stress
         if path.is_file():
             run.frames = [Frame(path)]
         folder = run.folder / "pictures"
@@ -63,13 +67,14 @@ def draw_fringes(path: Path, parameter: float, times: list[float]) -> int:
 def main() -> int:
     options = arguments()
     if options.fringes is not None:
-        return draw_fringes(options.run, options.fringes, options.times)
+        return draw_fringes(options.run, options.fringes, options.times, options.raw_stress)
     try:
         run = Run(options.run)
         other = Run(options.compare) if options.compare else None
     except MissingData as error:
         print(f"plot: {error}", file=sys.stderr)
         return 2
+    run.raw_stress = options.raw_stress
     figures = list(FIGURES)
     if options.film:
         from film import film

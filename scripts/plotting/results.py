@@ -90,6 +90,15 @@ class Run:
         self.periodic = np.array(periodic[: self.dimension], bool)
         self.title = self.case.get("title", self.folder.name)
         self.frames = [Frame(path) for path in sorted(self.folder.glob("particles_*.vtkhdf"))]
+        self.raw_stress = False  # pictures show the points' stress as computed
+
+    def stress_name(self, frame: Frame) -> str:
+        """The field of stress that pictures show: the smooth one where the file holds it, and raw is not asked for."""
+        return "stress_smooth" if frame.has("stress_smooth") and not self.raw_stress else "stress"
+
+    def stress(self, frame: Frame) -> np.ndarray:
+        """Stress to look at (N x 6: xx yy zz xy yz xz) [Pa]."""
+        return frame.field(self.stress_name(frame))
 
     def _cells(self, domain: dict) -> np.ndarray:
         if "cells" in domain:

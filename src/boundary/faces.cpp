@@ -57,6 +57,15 @@ void mirror(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions
   });
 }
 
+/// Shear across a plane with the normal along d is odd; the first shear (xy | xy yz xz) is component `first`.
+template <int Dim>
+void mark_shear(int d, int first, std::vector<bool>& odd) {
+  if (Dim == 2)
+    odd[first] = true;
+  else
+    for (int shear = 0; shear < 3; ++shear) odd[first + shear] = d == shear || d == (shear + 1) % 3;
+}
+
 template <int Dim>
 Eigen::Map<Vec<Dim>> momentum_of(Piece<Dim>& piece, int node) {
   return Eigen::Map<Vec<Dim>>(piece.nodes.sums.data() + static_cast<std::size_t>(node) * NodeSums<Dim>::width +
@@ -93,11 +102,7 @@ void mirror_sums(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceCondi
   });
   mirror<Dim>(patch, lattice, faces, &NodeBox<Dim>::extras, NodeExtras<Dim>::width, [](int d, std::vector<bool>& odd) {
     odd[NodeExtras<Dim>::position + d] = true;
-    if (Dim == 2)
-      odd[2] = true;  // xy
-    else
-      for (int shear = 0; shear < 3; ++shear)  // xy, yz, xz
-        odd[3 + shear] = d == shear || d == (shear + 1) % 3;
+    mark_shear<Dim>(d, NodeExtras<Dim>::stress + (Dim == 2 ? 2 : 3), odd);
   });
   mirror_vectors(patch, lattice, faces, &NodeBox<Dim>::force);
 }
@@ -106,6 +111,12 @@ template <int Dim>
 void mirror_vectors(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                     AlignedDoubles NodeBox<Dim>::*vectors) {
   mirror<Dim>(patch, lattice, faces, vectors, vector_width, [](int d, std::vector<bool>& odd) { odd[d] = true; });
+}
+
+template <int Dim>
+void mirror_stress(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces) {
+  mirror<Dim>(patch, lattice, faces, &NodeBox<Dim>::sums, NodeStress<Dim>::width,
+              [](int d, std::vector<bool>& odd) { mark_shear<Dim>(d, NodeStress<Dim>::stress + 3, odd); });
 }
 
 template <int Dim>
@@ -148,6 +159,7 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
   template void mirror_sums(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);       \
   template void mirror_vectors(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,     \
                                AlignedDoubles NodeBox<Dim>::*);                                  \
+  template void mirror_stress(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&);     \
   template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, \
                                    const std::vector<Body>&, bool);                              \
   template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,   \

@@ -47,7 +47,7 @@ inline constexpr Named<CompoundOperation> compound_names[] = {{"union", Compound
 
 /// Fields of the particle files that every point has, beside the position, which is always written.
 inline constexpr std::string_view particle_fields[] = {
-    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "image", "spin"};
+    "velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "image", "spin", "stress_smooth"};
 inline constexpr std::size_t default_particle_fields = 6;  // the first six
 
 }  // namespace cairn::reading

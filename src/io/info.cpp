@@ -33,6 +33,7 @@ const std::map<std::string_view, std::string_view> units = {
     {"angular_velocity", "rad/s"},
     {"acceleration", "m/s2"},
     {"stress", "Pa"},
+    {"stress_smooth", "Pa"},
     {"mean_stress", "Pa"},
     {"pressure", "Pa"},
     {"von_mises_stress", "Pa"},

@@ -90,8 +90,15 @@ bool NodeExchange<Dim>::beside_others(const Patch<Dim>& patch) const {
 template <int Dim>
 void NodeExchange<Dim>::begin_sums(bool extras) {
   using B = NodeBox<Dim>;
-  out_ = {{{&B::sums, NodeSums<Dim>::width, NodeSums<Dim>::used}, {&B::force, vector_width, Dim}}, true};
-  if (extras) out_.quantities.push_back({&B::extras, NodeExtras<Dim>::width, NodeExtras<Dim>::used});
+  std::vector<NodeQuantity<Dim>> quantities = {{&B::sums, NodeSums<Dim>::width, NodeSums<Dim>::used},
+                                               {&B::force, vector_width, Dim}};
+  if (extras) quantities.push_back({&B::extras, NodeExtras<Dim>::width, NodeExtras<Dim>::used});
+  begin_with_boxes(std::move(quantities));
+}
+
+template <int Dim>
+void NodeExchange<Dim>::begin_with_boxes(std::vector<NodeQuantity<Dim>> quantities) {
+  out_ = {std::move(quantities), true};
   for (auto& list : sent_) list.clear();
   messages_.begin();
 }

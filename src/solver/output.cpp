@@ -8,6 +8,8 @@
 namespace cairn {
 namespace {
 
+constexpr std::string_view smooth_stress_field = "stress_smooth";
+
 /// Columns under construction; keeps their numbers alive until the file is written.
 class Columns {
  public:
@@ -93,6 +95,8 @@ class PointTable {
       add_points(field, 6, [](const P& points, int p, int c) {
         return c < symmetric_size<Dim> ? points.column(C::stress + c)[p] : 0.0;
       });
+    else if (field == smooth_stress_field)
+      add_smooth_stress();
     else if (field == "deformation_gradient")
       add_points(field, 9, [](const P& points, int p, int c) {
         if (Dim == 2 && c != 8 && (c % 3 == 2 || c / 3 == 2)) return 0.0;
@@ -117,19 +121,35 @@ class PointTable {
   std::span<const Column> view() const { return columns_; }
 
  private:
-  /// A column with value(piece, point, component).
+  /// A column with value(piece)(point, component).
   template <class T, class F>
-  void add_pieces(const std::string& name, int components, const F& value) {
+  void add_column(const std::string& name, int components, const F& value) {
     columns_.push_back({name, components, BlockSource<T>([this, components, value](std::size_t block) {
                           auto& out = std::get<std::vector<T>>(buffers_);
                           const Patch<Dim>& patch = *filled_[block];
                           out.resize(static_cast<std::size_t>(patch.point_count() * components));
                           T* next = out.data();
-                          for (const auto& piece : patch.pieces)
+                          for (const auto& piece : patch.pieces) {
+                            const auto of_piece = value(piece);
                             for (int p = 0; p < piece.points.size(); ++p)
-                              for (int c = 0; c < components; ++c) *next++ = value(piece, p, c);
+                              for (int c = 0; c < components; ++c) *next++ = of_piece(p, c);
+                          }
                           return std::span<const T>(out);
                         })});
+  }
+  /// A column with value(piece, point, component).
+  template <class T, class F>
+  void add_pieces(const std::string& name, int components, const F& value) {
+    add_column<T>(name, components, [value](const Piece<Dim>& piece) {
+      return [&piece, value](int p, int c) { return value(piece, p, c); };
+    });
+  }
+  void add_smooth_stress() {
+    add_column<double>(std::string(smooth_stress_field), 6, [this](const Piece<Dim>& piece) {
+      return [smooth = smooth_stress(piece, simulation_.lattice(), simulation_.transfer())](int p, int c) {
+        return c < symmetric_size<Dim> ? smooth[p][c] : 0.0;
+      };
+    });
   }
   /// A column with value(points, point, component).
   template <class T = double, class F>
@@ -167,8 +187,9 @@ void append(std::vector<double>& out, const Vec3& v) { out.insert(out.end(), v.d
 }  // namespace
 
 template <int Dim>
-void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file,
+void write_particles(Simulation<Dim>& simulation, const std::filesystem::path& file,
                      const std::vector<std::string>& fields) {
+  if (std::ranges::find(fields, smooth_stress_field) != fields.end()) simulation.project_stress();
   PointTable<Dim> table(simulation);
   table.add("position");
   for (const auto& field : fields)
@@ -220,10 +241,9 @@ void write_contacts(const Simulation<Dim>& simulation, const std::filesystem::pa
                "contacts");
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                        \
-  template void write_particles(const Simulation<Dim>&, const std::filesystem::path&, \
-                                const std::vector<std::string>&);                     \
-  template void write_grains(const Simulation<Dim>&, const std::filesystem::path&);   \
+#define CAIRN_INSTANTIATE(Dim)                                                                                    \
+  template void write_particles(Simulation<Dim>&, const std::filesystem::path&, const std::vector<std::string>&); \
+  template void write_grains(const Simulation<Dim>&, const std::filesystem::path&);                               \
   template void write_contacts(const Simulation<Dim>&, const std::filesystem::path&, double);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

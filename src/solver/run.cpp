@@ -104,8 +104,10 @@ class Run {
   /// Leaves the points as they are now in a file of their own.
   [[noreturn]] void fail(const std::string& reason) {
     std::string text = fmt::format("the state then is in {} in the folder of the results", failure_file);
+    std::vector<std::string> fields = case_.output.particles.fields;
+    std::erase(fields, "stress_smooth");  // of points that may be anywhere
     try {
-      write_particles(simulation_, next_result(failure_file), case_.output.particles.fields);
+      write_particles(simulation_, next_result(failure_file), fields);
     } catch (const RunError& error) {
       text = fmt::format("the state then is lost: {}", error.what());
     }

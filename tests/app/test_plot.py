@@ -190,6 +190,30 @@ def fringes(scratch: Path):
         check_picture(pictures)
 
 
+def smooth(scratch: Path):
+    """Pictures show the smooth stress where the files hold it, and the points' own on request, or where they do not."""
+    folder = scratch / "smooth"
+    write_run(folder, "Smooth", (0.0, WIDTH), 1.0)
+    files = sorted(folder.glob("particles_*.vtkhdf"))
+    for path in files[2:]:
+        path.unlink()
+    scales = {"stress": 3e6, "stress_smooth": 1e6}
+    for path in files[:2]:
+        with h5py.File(path, "r+") as file:
+            for name, scale in scales.items():
+                stress = np.zeros((len(file["VTKHDF/Points"]), 6))
+                stress[:, 0] = scale
+                file["VTKHDF/PointData"].pop(name, None)
+                file[f"VTKHDF/PointData/{name}"] = stress
+    for options, name in (([], "stress_smooth"), (["--raw-stress"], "stress")):
+        plot(folder, *options)
+        summary = json.loads((folder / "pictures" / "summary.json").read_text())
+        assert summary["principal_stress_field"] == name, summary
+        assert abs(summary["principal_stress_scale_Pa"] / scales[name] - 1) < 1e-9, summary
+    plot(folder, "--fringes", 1e6, "--raw-stress")
+    check_picture(folder / "pictures" / "photoelastic.png")
+
+
 def nothing(scratch: Path):
     """A folder without results is refused in one line."""
     (scratch / "empty").mkdir()
@@ -203,6 +227,7 @@ def main():
     nothing(scratch)
     synthetic(scratch)
     fringes(scratch)
+    smooth(scratch)
     real(cairn, scratch)
 
 

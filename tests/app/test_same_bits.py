@@ -25,7 +25,7 @@ SHAPES = ("linear", "gimp", "bspline2")
 STRESS_UPDATES = ("last", "first", "both", "modified_last")
 RELEASES = ("approach", "traction", "reaction")
 MOST_LINES = 8  # of differences between two runs
-FIELDS = '["velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "image"]'
+FIELDS = '["velocity", "stress", "body", "id", "volume", "mass", "deformation_gradient", "image", "stress_smooth"]'
 
 # Shortened, with every output; the spheres on a coarser grid. In both, points cross patches and bodies collide.
 CASES = {

@@ -29,6 +29,13 @@ struct NodeExtras {
   static constexpr int stress = 0, position = Dim == 2 ? 3 : 6;
   static constexpr int used = position + Dim, width = Dim == 2 ? 8 : 16;
 };
+/// What a smooth field of stress is made of, in the place of the sums (docs/results.md): volume [m^Dim], and
+/// volume-weighted stress (xx yy zz xy | xx yy zz xy yz xz).
+template <int Dim>
+struct NodeStress {
+  static constexpr int volume = 0, stress = 1;
+  static constexpr int used = 1 + symmetric_size<Dim>, width = NodeSums<Dim>::width;
+};
 /// What points gather to move: acceleration, then velocity.
 template <int Dim>
 struct NodeMotion {

@@ -16,6 +16,10 @@ template <int Dim>
 void mirror_vectors(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                     AlignedDoubles NodeBox<Dim>::*vectors);
 
+/// The same for NodeStress, in the place of the sums.
+template <int Dim>
+void mirror_stress(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces);
+
 /// Fixed faces: their velocity at the nodes, for strains. With `close_ledger`, on velocities projected again at the end
 /// of the step, the loss of bringing the points to that velocity goes into the ledger (contact/ledger.hpp).
 template <int Dim>

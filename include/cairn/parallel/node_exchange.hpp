@@ -37,6 +37,8 @@ class NodeExchange {
   /// For the sums, forces (and extras) of shared nodes, with the boxes they cover: `add` makes node boxes grow to hold
   /// what arrives, and ghost pieces come and go.
   void begin_sums(bool extras);
+  /// The same with other quantities, of node boxes that are not needed any more: for what is not part of a step.
+  void begin_with_boxes(std::vector<NodeQuantity<Dim>> quantities);
   /// For one more array (forces of a new stress, momenta projected again) over the same nodes, put in the same order.
   void begin(AlignedDoubles NodeBox<Dim>::*values);
   void put(Patch<Dim>& patch, std::size_t p);

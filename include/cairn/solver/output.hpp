@@ -7,9 +7,10 @@
 
 namespace cairn {
 
-/// Writes the material points with the fields asked for. Collective.
+/// Writes the material points with the fields asked for; `stress_smooth` uses the nodes, and is not to be asked for
+/// after a step that failed. Collective.
 template <int Dim>
-void write_particles(const Simulation<Dim>& simulation, const std::filesystem::path& file,
+void write_particles(Simulation<Dim>& simulation, const std::filesystem::path& file,
                      const std::vector<std::string>& fields);
 
 /// Writes one row for each body. Collective.

@@ -108,6 +108,10 @@ class Simulation {
     for (auto& patch : patches_) patch.contacts.clear();
   }
 
+  /// Gives every piece's nodes the complete NodeStress, until the next step, which it does not change. Collective; not
+  /// after a step that failed.
+  void project_stress();
+
   /// Energies, momentum and ledger. Collective; the result is valid on rank 0.
   Totals totals() const;
 

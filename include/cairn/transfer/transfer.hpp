@@ -51,6 +51,17 @@ void lay_out_nodes(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfe
 template <int Dim>
 void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density);
 
+/// points -> nodes: NodeStress, in the place of the sums. The piece has to be projected again before its next step.
+template <int Dim>
+void project_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings);
+
+/// nodes -> points: sum N s, where s is the mean stress at a node, from complete NodeStress (xx yy zz xy | xx yy zz xy
+/// yz xz) [Pa]. What points differ by where the nodes see nothing of it is gone; a linear field stays as it is but
+/// within a point's reach of a surface, where it is drawn to the mean of the material there.
+template <int Dim>
+std::vector<std::array<double, symmetric_size<Dim>>> smooth_stress(const Piece<Dim>& piece, const Lattice<Dim>& lattice,
+                                                                   const TransferSettings<Dim>& settings);
+
 /// nodes -> points: strain over `strain_dt` from the nodal velocity, deformation gradient and stress; then
 /// x_p += dt sum N v with the velocity of the motion (eq. 10). Raises `speeds`.
 template <int Dim>
