@@ -129,16 +129,21 @@ TEST(ContactSweep, ReactionDecidesOnceAndKeepsIt) {
   expect_close<2>(held.projected(0), V(1, 2), 10);
 }
 
-TEST(ContactSweep, CommonNormalIsThatOfTheLargerGradient) {
-  auto list = meeting_pair();
-  list[0].gradient = V(0.1, 0.1), list[1].gradient = V(-2, 0);  // a corner of body 0 on a face of body 1
-  NodePatch<2> node(list);
-  node.first(node.settings(options_of(ContactLaw::frictionless, Release::approach)));
-  expect_close<2>(node.momentum(0), V(1, 2), 10);
-  list[0].gradient = V(3, 3), list[1].gradient = V(-2, 0);
-  NodePatch<2> tilted(list);
-  tilted.first(tilted.settings(options_of(ContactLaw::frictionless, Release::approach)));
-  expect_close<2>(tilted.momentum(0), V(4 - 2.25, 2 - 2.25), 10);  // P . (1,1)/2 = 2.25
+TEST(ContactSweep, CommonNormalIsThatOfTheFlatterSurface) {
+  const auto after = [](double volume_0, V gradient_0, double volume_1, V gradient_1) {
+    auto list = meeting_pair();
+    list[0].volume = volume_0, list[0].gradient = gradient_0;
+    list[1].volume = volume_1, list[1].gradient = gradient_1;
+    NodePatch<2> node(list);
+    node.first(node.settings(options_of(ContactLaw::frictionless, Release::approach)));
+    return V(node.momentum(0));
+  };
+  const V straight(1, 2), tilted(4 - 2.25, 2 - 2.25);  // P . (1,1)/2 = 2.25
+  // A corner of body 0 on a face of body 1; a face of body 0 at 45 degrees and a corner of body 1.
+  expect_close<2>(after(0.0625, V(0.25, 0.125), 0.5, V(-1, 0)), straight, 10);
+  expect_close<2>(after(0.5, V(1, 1) * std::sqrt(0.5), 0.25, V(-0.2, 0)), tilted, 10);
+  // Points whose squares overlap make a foot of body 0 steeper than any flat surface: the face of body 1 counts.
+  expect_close<2>(after(0.6, V(1.3, 0.6), 0.5, V(-1, 0)), straight, 10);
 }
 
 TEST(ContactSweep, WithoutAnyGradientNothingHappens) {
