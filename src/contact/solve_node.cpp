@@ -46,13 +46,15 @@ void ContactSweep<Dim>::solve(const Node& node, const Patch<Dim>& patch, const L
     node.pair_count == 1 ? solve_pair(node, pairs[0], pass) : solve_together(node, pass);
   }
   if (!(options.impulse_limit > 0)) return;
-  for (int i = 0; i < node.count; ++i) impulses_[i].setZero();
+  double mass = 0;
+  for (int i = 0; i < node.count; ++i) impulses_[i].setZero(), mass += entries_[node.first + i].mass;
   for (int p = 0; p < node.pair_count; ++p) {
-    const NodePair<Dim>& pair = pairs[p];
-    pairs[p].impulse *=
-        contact::impulse_scale<Dim>(pair.impulse, entries_[node.first + pair.a].mass, 1.0 / inverse_mass(node, pair.b),
-                                    lattice.spacing(), options.impulse_limit, dt);
-    give(pairs[p], pairs[p].impulse);
+    NodePair<Dim>& pair = pairs[p];
+    const bool rigid = pair.face != pair.none || entries_[node.first + node.partner].rigid;
+    const double own = entries_[node.first + pair.a].mass;
+    const double rest = rigid ? std::numeric_limits<double>::infinity() : mass - own;
+    pair.impulse *= contact::impulse_scale<Dim>(pair.impulse, own, rest, lattice.spacing(), options.impulse_limit, dt);
+    give(pair, pair.impulse);
   }
 }
 

@@ -48,10 +48,29 @@ std::vector<int> motion_columns(bool spin) {
 /// A piece's motion as it was, and what it takes to book its energy.
 template <int Dim>
 struct Motion {
+  explicit Motion(const Piece<Dim>& piece, const std::vector<int>& columns, double density,
+                  std::vector<std::array<double, spin_size<Dim>>> inertia_)
+      : inertia(std::move(inertia_)) {
+    for (int c : columns)
+      values.insert(values.end(), piece.points.column(c), piece.points.column(c) + piece.points.size());
+    add_energy(piece, density, 1);
+  }
+
   std::vector<double> values;                               // by column
   std::vector<std::array<double, spin_size<Dim>>> inertia;  // of spins, over mass [m2]
   double moving = 0, spinning = 0;                          // kinetic energy of velocities and of spins [J]
 
+  /// Where the points hold what no node sees of their motion: the motion less a share of that. Leaves the energies
+  /// taken.
+  void restore_but(double share, Piece<Dim>& piece, const std::vector<int>& columns, double density) {
+    const double* before = values.data();
+    for (int c : columns)
+      for (double *v = piece.points.column(c), *end = v + piece.points.size(); v != end; ++v)
+        *v = *before++ - share * *v;
+    add_energy(piece, density, -1);
+  }
+
+ private:
   void add_energy(const Piece<Dim>& piece, double density, double sign) {
     using C = PointColumns<Dim>;
     for (int p = 0; p < piece.points.size(); ++p) {
@@ -77,11 +96,8 @@ void Simulation<Dim>::filter_noise() {
     project_points(patch);
     for (auto& piece : patch.pieces) {
       if (is_rigid(piece)) continue;
-      Motion<Dim>& motion = motions[p][piece.body];
-      motion.inertia = spin_inertia(piece, lattice_, transfer_);
-      motion.add_energy(piece, material_of(piece).density, 1);
-      for (int c : columns)
-        motion.values.insert(motion.values.end(), piece.points.column(c), piece.points.column(c) + piece.points.size());
+      motions[p].emplace(piece.body, Motion<Dim>(piece, columns, material_of(piece).density,
+                                                 spin_inertia(piece, lattice_, transfer_)));
     }
   };
   const auto subtract_seen_part = [&](std::size_t p, Patch<Dim>& patch, bool first) {
@@ -101,12 +117,8 @@ void Simulation<Dim>::filter_noise() {
       const SolverMaterial& material = material_of(piece);
       const double speed = std::sqrt(material.longitudinal_modulus / material.density);
       const double share = 1 - std::exp(-plan.rate * plan.every * dt_ * speed / lattice_.smallest_spacing());
-      Motion<Dim>& motion = motions[p][piece.body];
-      const double* before = motion.values.data();
-      for (int c : columns)
-        for (double *v = piece.points.column(c), *end = v + piece.points.size(); v != end; ++v)
-          *v = *before++ - share * *v;
-      motion.add_energy(piece, material.density, -1);
+      Motion<Dim>& motion = motions[p].at(piece.body);
+      motion.restore_but(share, piece, columns, material.density);
       patch.ledger.filtered += motion.moving + motion.spinning;
       patch.ledger.blended_and_spun -= motion.spinning;  // of spins, the book takes what they have
     }
