@@ -47,9 +47,9 @@ std::vector<int> motion_columns(bool spin) {
 
 /// A piece's motion as it was, and what it takes to book its energy.
 template <int Dim>
-struct Motion {
-  explicit Motion(const Piece<Dim>& piece, const std::vector<int>& columns, double density,
-                  std::vector<std::array<double, spin_size<Dim>>> inertia_)
+struct PieceMotion {
+  explicit PieceMotion(const Piece<Dim>& piece, const std::vector<int>& columns, double density,
+                       std::vector<std::array<double, spin_size<Dim>>> inertia_)
       : inertia(std::move(inertia_)) {
     for (int c : columns)
       values.insert(values.end(), piece.points.column(c), piece.points.column(c) + piece.points.size());
@@ -90,14 +90,14 @@ void Simulation<Dim>::filter_noise() {
   if (plan.every == 0 || steps_ == 0 || steps_ % plan.every != 0) return;
   const auto time = timers_.measure(Stage::filter);
   const std::vector<int> columns = motion_columns<Dim>(transfer_.spin);
-  std::vector<std::map<int, Motion<Dim>>> motions(patches_.size());  // by body
+  std::vector<std::map<int, PieceMotion<Dim>>> motions(patches_.size());  // by body
 
   const auto keep = [&](std::size_t p, Patch<Dim>& patch) {
     project_points(patch);
     for (auto& piece : patch.pieces) {
       if (is_rigid(piece)) continue;
-      motions[p].emplace(piece.body, Motion<Dim>(piece, columns, material_of(piece).density,
-                                                 spin_inertia(piece, lattice_, transfer_)));
+      motions[p].emplace(piece.body, PieceMotion<Dim>(piece, columns, material_of(piece).density,
+                                                      spin_inertia(piece, lattice_, transfer_)));
     }
   };
   const auto subtract_seen_part = [&](std::size_t p, Patch<Dim>& patch, bool first) {
@@ -117,7 +117,7 @@ void Simulation<Dim>::filter_noise() {
       const SolverMaterial& material = material_of(piece);
       const double speed = std::sqrt(material.longitudinal_modulus / material.density);
       const double share = 1 - std::exp(-plan.rate * plan.every * dt_ * speed / lattice_.smallest_spacing());
-      Motion<Dim>& motion = motions[p].at(piece.body);
+      PieceMotion<Dim>& motion = motions[p].at(piece.body);
       motion.restore_but(share, piece, columns, material.density);
       patch.ledger.filtered += motion.moving + motion.spinning;
       patch.ledger.blended_and_spun -= motion.spinning;  // of spins, the book takes what they have
