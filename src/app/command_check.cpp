@@ -5,6 +5,7 @@
 #include "cairn/body/pack.hpp"
 #include "cairn/body/points.hpp"
 #include "cairn/core/printable.hpp"
+#include "cairn/io/first_step.hpp"
 #include "cairn/material/registry.hpp"
 #include "commands.hpp"
 #include "report.hpp"
@@ -88,6 +89,12 @@ void print_summary(const Case& c) {
              c.materials.size() == 1 ? "" : "s");
   fmt::print("  points     about {:.0f}\n", e.points);
   fmt::print("  memory     about {} in all\n", size_text(e.bytes));
+  const FirstStep first = first_step(c);
+  if (!std::isfinite(first.dt)) return;
+  const double steps = std::min(std::ceil(c.time.end / first.dt * (1 - 1e-9)), static_cast<double>(c.time.steps));
+  fmt::print("  first step {:.4g} s ({:.2g} of what a wave and a point take through a cell)\n", first.dt,
+             first.dt / first.crossing);
+  fmt::print("  steps      {:.0f}{}\n", steps, c.time.dt > 0 ? "" : ", if steps stay as long");
 }
 
 }  // namespace

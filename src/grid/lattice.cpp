@@ -11,11 +11,33 @@ Lattice<Dim>::Lattice(const Vec<Dim>& lower, const Vec<Dim>& upper, const Index<
   for (int d = 0; d < Dim; ++d) {
     spacing_[d] = (upper[d] - lower[d]) / cells[d];
     inverse_[d] = cells[d] / (upper[d] - lower[d]);
+    last_[d] = last_inside(d);
     patches_[d] = std::max(1, cells[d] / patch_cells);
     patch_count_ *= patches_[d];
     for (int i = 0; i <= patches_[d]; ++i)
       cuts_[d].push_back(static_cast<int>(static_cast<std::int64_t>(i) * cells[d] / patches_[d]));
   }
+}
+
+template <int Dim>
+double Lattice<Dim>::last_inside(int d) const {
+  double inside = lower_[d], outside = upper_[d];
+  if (scaled(d, outside) < cells_[d]) return outside;
+  while (true) {
+    const double middle = inside + 0.5 * (outside - inside);
+    if (!(middle > inside && middle < outside)) return inside;
+    (scaled(d, middle) < cells_[d] ? inside : outside) = middle;
+  }
+}
+
+template <int Dim>
+int Lattice<Dim>::wrap(int d, double& x) const {
+  const double xi = scaled(d, x);
+  const int periods = xi < 0 ? -1 : xi < cells_[d] ? 0 : 1;
+  const double moved = x - periods * length(d), rounding = 1e-3, at = scaled(d, moved);
+  if (periods == 0 || !(at >= -rounding && at <= cells_[d] + rounding)) return 0;
+  x = std::clamp(moved, lower_[d], last_[d]);
+  return periods;
 }
 
 template <int Dim>

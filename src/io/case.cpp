@@ -36,6 +36,7 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   errors.throw_if_any();
   check_points(c, errors);
+  check_time_step(c, errors);
   errors.throw_if_any();
 
   warn_about_bodies(c);

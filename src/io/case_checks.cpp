@@ -119,12 +119,6 @@ class OverlapSearch {
   double largest_ = 0;
 };
 
-double smallest_cell(const Domain& d) {
-  double least = infinity;
-  for (int k = 0; k < d.dimension; ++k) least = std::min(least, (d.upper[k] - d.lower[k]) / d.cells[k]);
-  return least;
-}
-
 /// Cells between a body and the nearest fixed face that holds it although the body does not sit on it, and that face;
 /// -1 when there is none.
 std::pair<double, int> gap_to_fixed_face(const BodySpec& body, const Case& c) {
@@ -138,13 +132,6 @@ std::pair<double, int> gap_to_fixed_face(const BodySpec& body, const Case& c) {
     if (gap > on_face && gap < nearest.first) nearest = {gap, face};
   }
   return nearest;
-}
-
-/// Moves as prescribed, whatever the faces do.
-bool is_prescribed(const Case& c, int index) {
-  const BodySpec& body = c.bodies[index];
-  return c.materials[body.material].model == "rigid" ||
-         std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, index, c.domain); });
 }
 
 void warn_about_fixed_faces(Case& c) {
@@ -209,6 +196,12 @@ bool holds_site(const Shape& shape, const Vec3& shift, const Case& c, std::int64
 
 }  // namespace
 
+bool is_prescribed(const Case& c, int index) {
+  const BodySpec& body = c.bodies[index];
+  return c.materials[body.material].model == "rigid" ||
+         std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, index, c.domain); });
+}
+
 void check_points(const Case& c, Errors& errors) {
   constexpr std::size_t most_reported = 20;
   const Domain& d = c.domain;
@@ -245,7 +238,8 @@ std::string placement_problem(const Shape& shape, const Domain& domain) {
     const double lower = domain.lower[k], upper = domain.upper[k];
     if (b.lower[k] > b.upper[k]) return "the shape is empty; its parts must share points";
     if (domain.periodic[k] && std::isfinite(b.lower[k]) && std::isfinite(b.upper[k])) {
-      if (middle[k] < lower || middle[k] > upper)
+      const double rounding = 1e-9 * (upper - lower);  // a table's; the points are wrapped
+      if (middle[k] < lower - rounding || middle[k] > upper + rounding)
         return fmt::format(
             "the centre has {} = {}, outside the domain [{}, {}], which is periodic there; move it by the period {}",
             "xyz"[k], middle[k], lower, upper, upper - lower);
@@ -294,6 +288,12 @@ void warn_about_bodies(Case& result) {
 }  // namespace cairn::reading
 
 namespace cairn {
+
+double smallest_cell(const Domain& d) {
+  double least = reading::infinity;
+  for (int k = 0; k < d.dimension; ++k) least = std::min(least, (d.upper[k] - d.lower[k]) / d.cells[k]);
+  return least;
+}
 
 bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain) {
   if (drive.overlapping < 0)

@@ -68,6 +68,8 @@ void read_face(Table table, int dimension, Face& face) {
   const bool moves = face.type == FaceType::fixed || face.type == FaceType::wall;
   if (table.has("velocity") && !moves) table.error("velocity", "is only for faces of type fixed or wall");
   if (table.has("friction") && face.type != FaceType::wall) table.error("friction", "is only for faces of type wall");
+  if (table.has("leaving") && face.type != FaceType::free) table.error("leaving", "is only for faces of type free");
+  face.leaving = table.choice("leaving", leaving_names, face.leaving);
   face.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
   face.friction = table.number("friction", 0.0, friction_range);
   table.finish();
@@ -213,6 +215,7 @@ void read_solver(Table solver, int dimension, SolverOptions& result) {
   result.surface = solver.choice("surface", surface_names, result.surface);
   result.noise_filter = solver.choice("noise_filter", noise_filter_names, result.noise_filter);
   result.noise_order = static_cast<int>(solver.integer("noise_order", result.noise_order, 1, 20));
+  result.lost_points = solver.choice("lost_points", lost_points_names, result.lost_points);
   result.energy_limit = solver.number("energy_limit", 0.0, not_negative);
   solver.finish();
 }

@@ -60,6 +60,11 @@ void warn_about_bodies(Case& result);
 /// A body that gets no material point is an error.
 void check_points(const Case& c, Errors& errors);
 
+/// Moves as prescribed, whatever the faces do.
+bool is_prescribed(const Case& c, int index);
+/// Refuses a fixed time step in which a wave or a point crosses more than a cell, and warns of one that nearly does.
+void check_time_step(Case& c, Errors& errors);
+
 /// The complete case file of a draft.
 std::string write_case(const Draft& draft);
 

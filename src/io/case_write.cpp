@@ -134,6 +134,7 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   out.key("surface", name_of(surface_names, solver.surface));
   out.key("noise_filter", name_of(noise_filter_names, solver.noise_filter));
   out.key("noise_order", solver.noise_order);
+  out.key("lost_points", name_of(lost_points_names, solver.lost_points));
   out.key("energy_limit", solver.energy_limit);
 }
 
@@ -223,6 +224,7 @@ void write_boundary(Writer& out, const Case& c) {
     std::string text = fmt::format("{{ type = \"{}\"", name_of(face_type_names, face.type));
     if (face.type == FaceType::fixed || face.type == FaceType::wall)
       text += ", velocity = " + list_of(face.velocity, c.domain.dimension);
+    if (face.type == FaceType::free) text += fmt::format(", leaving = \"{}\"", name_of(leaving_names, face.leaving));
     if (face.type == FaceType::wall) text += ", friction = " + text_of(face.friction);
     out.raw(face_names[i], text + " }");
   }

@@ -73,4 +73,14 @@ Law make_law(std::string_view model, const ParameterValues& parameters, Plane pl
   return *law;
 }
 
+double longitudinal_modulus(const Law& law) {
+  return std::visit(
+      [](const auto& concrete) {
+        Symmetric<3, double> stress{};
+        double state[state_capacity] = {};
+        return concrete.update(Tensor<3, double>{}, Tensor<3, double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, 1.0, stress, state);
+      },
+      law);
+}
+
 }  // namespace cairn

@@ -17,7 +17,8 @@ void put_piece(const Piece<Dim>& piece, Message& message) {
   for (int c = 0; c < points.columns(); ++c)
     std::copy_n(points.column(c), points.size(), message.extend(points.size()));
   for (auto id : points.ids()) message.put(id);
-  for (const auto& image : points.images()) message.put(std::bit_cast<std::int64_t>(image));
+  for (const auto& image : points.images())
+    for (const std::int64_t word : std::bit_cast<ImageWords>(image)) message.put(word);
 }
 
 /// Pieces with points only: ghosts come back with the next exchange.
@@ -52,7 +53,10 @@ Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim
     points.resize(count);
     for (int c = 0; c < columns; ++c, at += count) std::copy_n(message.data(at), count, points.column(c));
     for (auto& id : points.ids()) id = message.integer(at++);
-    for (auto& image : points.images()) image = std::bit_cast<Image>(message.integer(at++));
+    for (auto& image : points.images()) {
+      image = std::bit_cast<Image>(ImageWords{message.integer(at), message.integer(at + 1)});
+      at += 2;
+    }
   }
   return patch;
 }

@@ -10,34 +10,35 @@
 namespace cairn {
 namespace {
 
-/// The cell of a point (the nearest, for one within half a cell of the domain), its position wrapped at periodic
-/// boundaries; says in `failure` where it lies further outside.
+/// Where a point is.
 template <int Dim>
-Index<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& lattice, std::string& failure) {
-  Index<Dim> cell{};
+struct Place {
+  Index<Dim> cell{};  // the nearest, for a point within half a cell of the domain
+  bool left = false;  // through an open face
+  std::string lost;   // why it is in no cell
+};
+
+/// The place of a point, its position wrapped at periodic boundaries.
+template <int Dim>
+Place<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& lattice, const Exits<Dim>& exits) {
+  Place<Dim> place;
   for (int d = 0; d < Dim; ++d) {
     double& x = points.column(d)[p];
-    const double margin = lattice.periodic(d) ? 0.0 : 0.5;
-    const auto outside = [&] {
-      return !(lattice.scaled(d, x) >= -margin && lattice.scaled(d, x) < lattice.cells()[d] + margin);
-    };
-    if (lattice.periodic(d) && x - x == 0) {
-      // Twice: a position a rounding error below the domain may wrap to just its upper end, which is its lower end
-      // again.
-      for (int turn = 0; turn < 2 && outside(); ++turn) {
-        const int direction = lattice.scaled(d, x) < 0 ? 1 : -1;
-        x += direction * lattice.length(d);
-        points.images()[p][d] -= static_cast<std::int16_t>(direction);
-      }
+    std::int32_t& image = points.images()[p][d];
+    if (lattice.periodic(d) && __builtin_add_overflow(image, lattice.wrap(d, x), &image))
+      place.lost = fmt::format("point {} of body {} crossed a periodic boundary more often than can be counted",
+                               points.ids()[p], body);
+    const double xi = lattice.scaled(d, x), margin = lattice.periodic(d) ? 0.0 : 0.5;
+    if (xi >= -margin && xi < lattice.cells()[d] + margin) {
+      place.cell[d] = std::clamp(static_cast<int>(std::floor(xi)), 0, lattice.cells()[d] - 1);
+    } else if (std::isfinite(xi) && !lattice.periodic(d) && exits.open[2 * d + (xi > 0)]) {
+      place.left = true;
+    } else {
+      place.lost = fmt::format("point {} of body {} left the domain: {} = {:.6g} m, velocity {:.6g} m/s there",
+                               points.ids()[p], body, "xyz"[d], x, points.column(PointColumns<Dim>::velocity + d)[p]);
     }
-    if (outside()) {
-      failure = fmt::format("point {} of body {} left the domain: {} = {:.6g} m, velocity {:.6g} m/s there",
-                            points.ids()[p], body, "xyz"[d], x, points.column(PointColumns<Dim>::velocity + d)[p]);
-      return cell;
-    }
-    cell[d] = std::clamp(static_cast<int>(std::floor(lattice.scaled(d, x))), 0, lattice.cells()[d] - 1);
   }
-  return cell;
+  return place;
 }
 
 }  // namespace
@@ -62,19 +63,40 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
   Points<Dim>& points = piece.points;
   std::vector<int> staying;
   std::vector<std::pair<int, int>> leaving;  // patch, point
+  std::vector<Departure> departing;
   for (int p = 0; p < points.size(); ++p) {
-    std::string failure;
-    const int to = lattice.patch_of_cell(locate(points, p, piece.body, lattice, failure));
+    if (is_lost(points.ids()[p])) {
+      departing.push_back({p, "marked"});
+      continue;
+    }
+    Place<Dim> place = locate(points, p, piece.body, lattice, exits_);
+    const int to = place.left ? patch.id : lattice.patch_of_cell(place.cell);
     const bool near =
         std::any_of(patch.links.begin(), patch.links.end(), [&](const auto& link) { return link.patch == to; });
-    if (failure.empty() && to != patch.id && !near)
-      failure = fmt::format("point {} of body {} crossed more than a patch in one step", points.ids()[p], piece.body);
-    if (failure_.empty()) failure_ = failure;
-    if (to == patch.id || !failure.empty())
+    if (place.lost.empty() && to != patch.id && !near)
+      place.lost = fmt::format("point {} of body {} crossed more than a patch in one step", points.ids()[p], piece.body);
+    const bool lost = !place.lost.empty();
+    if (lost && !exits_.drop_lost) {
+      if (failure_.empty()) failure_ = place.lost;
       staying.push_back(p);
-    else
+    } else if (lost || place.left) {
+      departing.push_back({p, place.lost});
+    } else if (to == patch.id) {
+      staying.push_back(p);
+    } else {
       leaving.emplace_back(to, p);
+    }
   }
+  if (!departing.empty()) exits_.book(patch, piece, departing);
+  send(patch, piece, leaving);
+  points.select(staying);
+}
+
+/// Puts points into the messages: for each pair (patch they go to, point), in that order.
+template <int Dim>
+void Migration<Dim>::send(const Patch<Dim>& patch, const Piece<Dim>& piece,
+                          std::vector<std::pair<int, int>>& leaving) {
+  const Points<Dim>& points = piece.points;
   std::stable_sort(leaving.begin(), leaving.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (std::size_t i = 0; i < leaving.size();) {
     std::size_t end = i;
@@ -86,11 +108,10 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
     for (; i < end; ++i) {
       const int p = leaving[i].second;
       message.put(points.ids()[p]);
-      message.put(std::bit_cast<std::int64_t>(points.images()[p]));
+      for (const std::int64_t word : std::bit_cast<ImageWords>(points.images()[p])) message.put(word);
       for (int c = 0; c < points.columns(); ++c) message.put(points.column(c)[p]);
     }
   }
-  points.select(staying);
 }
 
 template <int Dim>
@@ -114,7 +135,7 @@ void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
       a.to = static_cast<int>(message.integer(at++)), a.from = static_cast<int>(message.integer(at++));
       a.body = static_cast<int>(message.integer(at++)), a.count = static_cast<int>(message.integer(at++));
       a.columns = static_cast<int>(message.integer(at++)), a.rank = rank, a.at = at;
-      at += static_cast<std::size_t>(a.count) * (2 + a.columns);
+      at += static_cast<std::size_t>(a.count) * (3 + a.columns);
       arrivals.push_back(a);
     }
   };
@@ -136,7 +157,8 @@ void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
     std::size_t at = a.at;
     for (int i = 0; i < a.count; ++i, ++p) {
       points.ids()[p] = message.integer(at++);
-      points.images()[p] = std::bit_cast<Image>(message.integer(at++));
+      points.images()[p] = std::bit_cast<Image>(ImageWords{message.integer(at), message.integer(at + 1)});
+      at += 2;
       for (int c = 0; c < a.columns; ++c) points.column(c)[p] = *message.data(at++);
     }
   }

@@ -47,9 +47,9 @@ Shares shares_of(const Simulation<Dim>& simulation) {
 }
 
 /// Moments of a piece about its body's first centre: mass, m r, m v, m r x v, m r r^T (6), V sigma (6), V, and the
-/// inertia of the points' own spin (3).
+/// inertia of the points' own spin (3), and the number of points.
 struct Moments {
-  static constexpr int size = 26;
+  static constexpr int size = 27;
   std::array<double, size> m{};
 };
 
@@ -72,7 +72,7 @@ Moments moments_of(const Simulation<Dim>& simulation, const Piece<Dim>& piece) {
     const double volume0 = points.column(C::volume)[p], mass = density * volume0, volume = volume0 * determinant(F);
     const Vec3 spin = r.cross(v);
     double* m = sums.m.data();
-    m[0] += mass;
+    m[0] += mass, m[26] += 1;
     for (int i = 0; i < 3; ++i) m[1 + i] += mass * r[i], m[4 + i] += mass * v[i], m[7 + i] += mass * spin[i];
     for (int i = 0; i < 3; ++i) {
       m[10 + i] += mass * r[i] * r[i];
@@ -91,7 +91,7 @@ Moments moments_of(const Simulation<Dim>& simulation, const Piece<Dim>& piece) {
 
 BodyState state_of(int body, const std::array<double, Moments::size>& m, const Vec3& origin, int dimension) {
   BodyState s;
-  s.body = body, s.mass = m[0];
+  s.body = body, s.mass = m[0], s.points = static_cast<int>(m[26]);
   const Vec3 offset = Vec3(m[1], m[2], m[3]) / m[0];
   s.centre = origin + offset;
   s.velocity = Vec3(m[4], m[5], m[6]) / m[0];

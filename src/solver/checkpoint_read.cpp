@@ -149,11 +149,7 @@ void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
         for (int p = 0; p < piece.points.size(); ++p, ++row) {
           piece.points.ids()[p] = ids[row];
           Image image{};
-          for (int i = 0; i < image_components; ++i) {
-            const std::int32_t crossings = images[row * image_components + i];
-            image[i] = static_cast<Image::value_type>(crossings);
-            in.require(image[i] == crossings, "it holds more crossings of a periodic boundary than a point can have");
-          }
+          std::copy_n(&images[row * image_components], image_components, image.begin());
           piece.points.images()[p] = image;
         }
   }

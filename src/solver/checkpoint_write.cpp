@@ -154,7 +154,7 @@ void write_state(CheckpointWriter& writer, const RunState& state, MPI_Comm comm)
 template <int Dim>
 std::int64_t bytes_of(const Layout& layout, int states, std::size_t texts) {
   const auto sum = [](const Counts& counts) { return std::accumulate(counts.begin(), counts.end(), std::int64_t{0}); };
-  constexpr std::int64_t point = 8 + 4 * image_components, piece = 16, patch = 8 * 40;
+  constexpr std::int64_t point = 8 + 4 * image_components, piece = 16, patch = 8 * 50;
   return sum(layout.points) * (point + 8 * (PointColumns<Dim>::state + states)) + sum(layout.pieces) * piece +
          sum(layout.contacts) * (8 + 8 * ContactSum<Dim>::size) + std::ssize(layout.points) * patch +
          static_cast<std::int64_t>(texts);
@@ -170,7 +170,8 @@ void write_checkpoint(const std::filesystem::path& file, const Simulation<Dim>& 
   const Layout layout = layout_of(simulation);
   const int states = most_states(simulation.materials());
   const std::int64_t bytes = bytes_of<Dim>(layout, states, case_text.size() + 64 * state.series.size());
-  CheckpointWriter writer(file, comm, bytes, simulation.total_points(), state.step.time, state.step.steps);
+  const std::int64_t points = std::accumulate(layout.points.begin(), layout.points.end(), std::int64_t{0});
+  CheckpointWriter writer(file, comm, bytes, points, state.step.time, state.step.steps);
   writer.add("dimension", std::int64_t{Dim});
   write_state(writer, state, comm);
   writer.add_text("case", case_text);

@@ -27,8 +27,9 @@ bool all_finite(const std::vector<double>& values) {
   return std::ranges::all_of(values, [](double a) { return std::isfinite(a); });
 }
 
+/// As fault_of, in words that go on from the point's name.
 template <int Dim>
-Fault fault_of(const Points<Dim>& points, int p) {
+Fault complaint_of(const Points<Dim>& points, int p) {
   using C = PointColumns<Dim>;
   const double J = determinant_of(points, p);
   if (std::isfinite(J) && J <= 0) return {Fault::inverted, fmt::format("is inverted: det F = {:.6g}", J)};
@@ -46,20 +47,28 @@ Fault fault_of(const Points<Dim>& points, int p) {
 }  // namespace
 
 template <int Dim>
+Fault fault_of(const Points<Dim>& points, int p, int body) {
+  Fault fault = complaint_of(points, p);
+  if (fault.kind != Fault::none)
+    fault.text = fmt::format("point {} of body {} at ({:.6g}) m {}", points.ids()[p], body,
+                             fmt::join(numbers_of(points, p, PointColumns<Dim>::position, Dim), ", "), fault.text);
+  return fault;
+}
+
+template <int Dim>
 Fault find_fault(const std::vector<Patch<Dim>>& patches, const std::vector<Body>& bodies) {
   Fault worst{Fault::none, "a point's wave speed or velocity is too large for a number"};
   for (const auto& patch : patches)
     for (const auto& piece : patch.pieces)
       for (int p = 0; p < piece.points.size() && !bodies[piece.body].rigid; ++p) {
-        const Fault fault = fault_of(piece.points, p);
-        if (fault.kind <= worst.kind) continue;
-        const auto x = numbers_of(piece.points, p, PointColumns<Dim>::position, Dim);
-        worst = {fault.kind, fmt::format("point {} of body {} at ({:.6g}) m {}", piece.points.ids()[p], piece.body,
-                                         fmt::join(x, ", "), fault.text)};
+        const Fault fault = fault_of(piece.points, p, piece.body);
+        if (fault.kind > worst.kind) worst = fault;
       }
   return worst;
 }
 
+template Fault fault_of(const Points<2>&, int, int);
+template Fault fault_of(const Points<3>&, int, int);
 template Fault find_fault(const std::vector<Patch<2>>&, const std::vector<Body>&);
 template Fault find_fault(const std::vector<Patch<3>>&, const std::vector<Body>&);
 

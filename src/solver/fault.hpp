@@ -15,6 +15,10 @@ struct Fault {
   std::string text;  // body, point, position and what is wrong
 };
 
+/// What is wrong with a point of a deformable body.
+template <int Dim>
+Fault fault_of(const Points<Dim>& points, int p, int body);
+
 /// The first deformable point of the worst kind, of one rank's patches.
 template <int Dim>
 Fault find_fault(const std::vector<Patch<Dim>>& patches, const std::vector<Body>& bodies);

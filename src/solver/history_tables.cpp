@@ -21,7 +21,9 @@ std::vector<std::string> history_columns(int dimension) {
                                     "momentum_y"};
   if (dimension == 3) names.emplace_back("momentum_z");
   names.insert(names.end(), {"contact_nodes", "mass", "viscous_dissipation", "numerical_dissipation",
-                             "filter_dissipation", "contact_gain", "points_stopped"});
+                             "filter_dissipation", "contact_gain", "points_stopped", "points_left", "points_lost",
+                             "mass_left", "energy_left", "momentum_left_x", "momentum_left_y"});
+  if (dimension == 3) names.emplace_back("momentum_left_z");
   return names;
 }
 
@@ -61,6 +63,10 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   row.emplace_back(t.filtered);
   row.emplace_back(t.contact_gain);
   row.emplace_back(static_cast<std::int64_t>(t.stopped));
+  row.emplace_back(static_cast<std::int64_t>(t.points_left));
+  row.emplace_back(static_cast<std::int64_t>(t.points_lost));
+  for (const double left : {t.mass_left, t.energy_left, t.momentum_left_x, t.momentum_left_y}) row.emplace_back(left);
+  if (Dim == 3) row.emplace_back(t.momentum_left_z);
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

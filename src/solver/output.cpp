@@ -205,6 +205,7 @@ void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path
   auto& position = columns.add_doubles("position", 3);
   auto& body = columns.add_ints("body", 1);
   auto& material = columns.add_ints("material", 1);
+  auto& points = columns.add_ints("points", 1);
   auto& mass = columns.add_doubles("mass", 1);
   auto& centre = columns.add_doubles("centre", 3);
   auto& velocity = columns.add_doubles("velocity", 3);
@@ -215,7 +216,7 @@ void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path
     append(position, s.centre), append(centre, s.centre), append(velocity, s.velocity),
         append(spin, s.angular_velocity);
     body.push_back(s.body), material.push_back(simulation.bodies()[s.body].material), contacts.push_back(s.contacts);
-    mass.push_back(s.mass);
+    mass.push_back(s.mass), points.push_back(s.points);
     stress.insert(stress.end(), s.mean_stress.begin(), s.mean_stress.end());
   }
   const RowBlocks rows = consecutive_rows(static_cast<std::int64_t>(states.size()), simulation.communicator());

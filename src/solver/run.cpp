@@ -27,6 +27,14 @@ constexpr int done = 0, stopped = 4;  // exit codes
 // Reasons to stop, above the numbers of signals; the largest of all ranks counts.
 constexpr double wall_limit_reached = 1000, file_failed = 2000;
 
+/// For each mass [J/kg]; EnergyBook.
+double energy_that_matters(const Case& c) {
+  double speed = 0;
+  for (const auto& drive : c.drives) speed = std::max(speed, drive.velocity.norm());
+  for (const auto& face : c.faces) speed = std::max(speed, face.velocity.norm());
+  return c.domain.gravity.norm() * smallest_cell(c.domain) + 0.5 * speed * speed;
+}
+
 template <int Dim>
 class Run {
  public:
@@ -42,7 +50,8 @@ class Run {
         history_clock_(c.output.history),
         checkpoints_(c.output.checkpoint),
         particle_index_(settings.out / "particles.hdf.series"),
-        tables_(settings.out, c.output.track) {
+        tables_(settings.out, c.output.track),
+        book_(energy_that_matters(c)) {
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &ranks_);
     for (const Schedule* s :
@@ -60,6 +69,7 @@ class Run {
     ProgressDisplay display;
     while (running()) {
       const Notice agreed = advance();
+      tell_notes();
       const double before = wall_clock();
       write_outputs(false, agreed.wall);
       if (rank_ == 0 && display.due(before)) display.show(progress(before - stepping), before);
@@ -73,6 +83,8 @@ class Run {
     write_outputs(true, wall_before_ + wall_clock() - start_);
     flush_results();
     display.finish();
+    const Totals totals = simulation_.totals();
+    if (rank_ == 0) tell_departures(totals);
     report(step_wall);
     return done;
   }
@@ -88,6 +100,20 @@ class Run {
     } catch (const RunError& error) {
       fail(error.what());
     }
+  }
+
+  /// Tells of points that were dropped, of the first ones in words.
+  void tell_notes() {
+    constexpr int most_told = 20;
+    for (const auto& note : simulation_.take_notes())
+      if (++notes_told_ <= most_told)
+        fmt::print(stderr, "cairn: {}{}\n", note, notes_told_ == most_told ? "; further ones are not named" : "");
+  }
+
+  static void tell_departures(const Totals& t) {
+    if (t.points_left + t.points_lost == 0) return;
+    fmt::print("left the domain: {:.0f} points; dropped: {:.0f} points; {:.6g} kg together\n", t.points_left,
+               t.points_lost, t.mass_left);
   }
 
   /// What this rank tells the others in a step.
@@ -263,6 +289,8 @@ class Run {
     const std::int64_t mine[3] = {simulation_.traffic().messages, simulation_.traffic().bytes, points};
     std::int64_t most[3] = {0, 0, 0};
     MPI_Reduce(mine, most, 3, MPI_INT64_T, MPI_MAX, 0, comm_);
+    std::int64_t points_now = 0;
+    MPI_Reduce(&points, &points_now, 1, MPI_INT64_T, MPI_SUM, 0, comm_);
     if (rank_ != 0) return;
     double total = 0;
     std::string shares;
@@ -276,7 +304,7 @@ class Run {
       const double steps = std::max(1.0, steps_here());
       fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
       fmt::print("most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
-      const double mean = static_cast<double>(simulation_.total_points()) / ranks_;
+      const double mean = std::max(1.0, static_cast<double>(points_now)) / ranks_;
       fmt::print("balance: largest over mean points {:.3f}, patches moved {} times",
                  static_cast<double>(most[2]) / mean, simulation_.times_balanced());
       if (simulation_.times_balanced() > 0)
@@ -285,7 +313,7 @@ class Run {
       fmt::print("\n");
     }
     RunSummary s;
-    s.steps = simulation_.steps() - steps_before_, s.points = simulation_.total_points(), s.time = simulation_.time();
+    s.steps = simulation_.steps() - steps_before_, s.points = points_now, s.time = simulation_.time();
     s.wall = wall_clock() - start_, s.step_wall = step_wall;
     s.point_steps = static_cast<double>(s.steps) * static_cast<double>(s.points);
     s.energy_error = book_.error(), s.ranks = ranks_;
@@ -309,6 +337,7 @@ class Run {
   UnflushedFiles unflushed_;       // of rank 0
   std::int64_t steps_before_ = 0;  // of the run, before this process
   double fraction_before_ = 0, wall_before_ = 0;
+  int notes_told_ = 0;
 };
 
 template <int Dim>

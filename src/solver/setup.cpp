@@ -6,6 +6,7 @@
 
 #include "cairn/body/cut_sites.hpp"
 #include "cairn/core/error.hpp"
+#include "cairn/io/first_step.hpp"
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/simulation.hpp"
@@ -29,14 +30,11 @@ Lattice<Dim> make_lattice(const Domain& domain) {
 
 SolverMaterial make_material(const Material& spec) {
   SolverMaterial m{spec.name, make_law(spec.model, spec.parameters, spec.plane), spec.density, false, 0.0, {}};
+  m.longitudinal_modulus = longitudinal_modulus(m.law);
   std::visit(
       [&](const auto& law) {
         m.rigid = law.rigid;
         m.state_names.assign(law.state_names.begin(), law.state_names.end());
-        Symmetric<3, double> stress{};
-        double state[state_capacity] = {};
-        m.longitudinal_modulus =
-            law.update(Tensor<3, double>{}, Tensor<3, double>{{1, 0, 0, 0, 1, 0, 0, 0, 1}}, 1.0, stress, state);
       },
       m.law);
   return m;
@@ -64,7 +62,7 @@ FaceConditions<Dim> make_faces(const Case& c) {
   for (int f = 0; f < 2 * Dim; ++f) {
     const Face& face = c.faces[f];
     faces[f].type = c.domain.periodic[f / 2] ? FaceType::periodic : face.type;
-    faces[f].velocity = head<Dim>(face.velocity);
+    faces[f].velocity = head<Dim>(face.velocity), faces[f].leaving = face.leaving;
     faces[f].friction.assign(c.materials.size(), {ContactLaw::friction, face.friction});
     for (const auto& pair : c.contact.pairs) {
       const int material = std::max(pair.material_a, pair.material_b);
@@ -161,7 +159,7 @@ class Filler {
       for (int d = 0; d < Dim; ++d) {
         points.column(d)[p] = x[d];
         points.column(C::velocity + d)[p] = v[d];
-        image[d] = static_cast<std::int16_t>(-std::lround(shift[d] / lattice_.length(d)));
+        image[d] = static_cast<std::int32_t>(-std::lround(shift[d] / lattice_.length(d)));
       }
       points.column(C::volume)[p] = share * volume / initial.volume_ratio;
       points.ids()[p] = first_id++;
@@ -261,12 +259,12 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
     materials_.push_back(make_material(spec));
     const double modulus = materials_.back().longitudinal_modulus, speed = std::sqrt(modulus / spec.density);
     contact_materials.push_back({modulus, speed});
-    speeds_.wave = std::max(speeds_.wave, speed);
   }
   contact_ = ContactSettings<Dim>::make(c.contact, contact_materials, make_faces<Dim>(c));
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   contact_.chords = c.solver.stress_update == StressUpdate::both;
   bodies_ = make_bodies(c, materials_);
+  speeds_.wave = first_step(c).wave_speed;
   if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
   for (int d = 0; d < Dim; ++d)
     for (int side = 0; side < 2; ++side) {

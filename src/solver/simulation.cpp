@@ -9,6 +9,7 @@
 #include "cairn/io/agreement.hpp"
 #include "cairn/parallel/balance.hpp"
 #include "fault.hpp"
+#include "point_budget.hpp"
 
 namespace cairn {
 namespace {
@@ -91,7 +92,13 @@ void Simulation<Dim>::step(double longest) {
 template <int Dim>
 void Simulation<Dim>::choose_time_step(double longest) {
   finish_speed_reduction();
-  dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * lattice_.smallest_spacing() / (maxima_[0] + maxima_[1]);
+  const double cell = lattice_.smallest_spacing(), speed = maxima_[0] + maxima_[1];
+  if (limits_.dt * speed > cell)
+    throw RunError(fmt::format(
+        "step {}: time.dt = {:.6g} s is longer than a wave or point takes through a cell, {:.6g} s (wave speed {:.6g} "
+        "m/s, point speed {:.6g} m/s); give a smaller time.dt, or leave it to time.cfl",
+        steps_ + 1, limits_.dt, cell / speed, maxima_[0], maxima_[1]));
+  if (speed > 0 || dt_ == 0) dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * cell / speed;  // else no point is left
   if (!(dt_ > 0) || !std::isfinite(dt_))
     throw RunError(fmt::format("step {}: the time step collapsed (wave speed {} m/s, point speed {} m/s)", steps_ + 1,
                                maxima_[0], maxima_[1]));
@@ -147,7 +154,9 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
     if (is_rigid(piece))
       std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
     else
-      update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, share * dt_, speeds_);
+      update_guarded(piece, [&](double part, SpeedLimits& speeds) {
+        update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, part * share * dt_, speeds);
+      });
     if (!projects_again()) velocities_.take_back(piece.nodes.velocity);
   });
 }
@@ -212,7 +221,7 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
     finish_piece(patch, piece, share);
     patch.ledger.stopped += static_cast<double>(std::exchange(speeds_.stopped, 0));
     if (!projects_again()) motions_.take_back(piece.nodes.motion), velocities_.take_back(piece.nodes.velocity);
-    if (all_inside(piece, lattice_, patch.id)) {
+    if (!marked_ && all_inside(piece, lattice_, patch.id)) {
       project_ahead(piece);
     } else {
       const auto time = timers_.measure(Stage::migrate);
@@ -239,7 +248,10 @@ void Simulation<Dim>::finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double 
     velocities_.lend(piece.nodes.velocity);
     velocity_from_motion(piece);
   }
-  update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, share * dt_, dt_, speeds_);
+  update_guarded(piece, [&](double part, SpeedLimits& speeds) {
+    update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, part * share * dt_, part * dt_,
+                           speeds);
+  });
 }
 
 /// The stress of a driven body turns with it: its nodes have the velocity of the rigid motion, whose gradient is its
@@ -283,6 +295,7 @@ void Simulation<Dim>::receive_points() {
   const auto time = timers_.measure(Stage::migrate);
   start_speed_reduction();
   migration_->finish(patches_);
+  marked_ = false;
   if ((steps_ + 1) % sort_interval == 0)
     for (auto& patch : patches_)
       for (auto& piece : patch.pieces) sort_by_cell(piece, lattice_, patch.cells);
@@ -296,6 +309,52 @@ void Simulation<Dim>::look_for_fault(int urgency) {
   const Fault fault = find_fault(patches_, bodies_);
   fault_urgency_ = 10 * urgency + fault.kind;
   fault_ = fault.text;
+}
+
+/// They take part in the rest of the step as mass without stress, and leave at its end.
+template <int Dim>
+void Simulation<Dim>::mark_faults(Piece<Dim>& piece) {
+  using C = PointColumns<Dim>;
+  Points<Dim>& points = piece.points;
+  for (int p = 0; p < points.size(); ++p) {
+    if (is_lost(points.ids()[p])) continue;
+    const Fault fault = fault_of(points, p, piece.body);
+    if (fault.kind == Fault::none) continue;
+    notes_.push_back(fmt::format("step {}: {}; it is dropped", steps_ + 1, fault.text));
+    marked_ = true;
+    mark_lost(points.ids()[p]);
+    for (int d = 0; d < Dim; ++d) {
+      if (!std::isfinite(points.column(d)[p]))
+        points.column(d)[p] = lattice_.node_position(d, piece.nodes.box.lower[d] + 1);
+      if (!std::isfinite(points.column(C::velocity + d)[p])) points.column(C::velocity + d)[p] = 0;
+    }
+    for (int c = C::spin; c < C::volume; ++c) points.column(c)[p] = 0;
+    for (int i = 0; i < 3; ++i) points.column(C::deformation + tensor_index<Dim>(i, i))[p] = 1;
+    for (int c = C::state; c < points.columns(); ++c)
+      if (!std::isfinite(points.column(c)[p])) points.column(c)[p] = 0;
+  }
+}
+
+template <int Dim>
+void Simulation<Dim>::book_departures(Patch<Dim>& patch, const Piece<Dim>& piece,
+                                      std::span<const Departure> departing) {
+  PatchLedger& ledger = patch.ledger;
+  for (const auto& [point, lost] : departing) {
+    ++(lost.empty() ? ledger.points_left : ledger.points_lost);
+    if (!lost.empty() && !is_lost(piece.points.ids()[point]))
+      notes_.push_back(fmt::format("step {}: {}; it is dropped", steps_ + 1, lost));
+  }
+  for_budgets(
+      piece, material_of(piece), is_rigid(piece), lattice_, transfer_, static_cast<int>(departing.size()),
+      [&](int i) { return departing[i].point; },
+      [&](int, const PointBudget& b) {
+        ledger.mass_left += b.mass;
+        if (!std::isfinite(b.energy())) return;  // no number to book
+        ledger.energy_left += b.energy();
+        ledger.blended_and_spun -= b.spin;
+        ledger.momentum_left_x += b.momentum[0], ledger.momentum_left_y += b.momentum[1];
+        ledger.momentum_left_z += b.momentum[2];
+      });
 }
 
 template <int Dim>
@@ -336,7 +395,13 @@ void Simulation<Dim>::connect_patches() {
   exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, owner_, patches_);
   beside_others_.clear();
   for (const auto& patch : patches_) beside_others_.push_back(exchange_->beside_others(patch));
-  migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_);
+  Exits<Dim> exits;
+  for (int face = 0; face < 2 * Dim; ++face)
+    exits.open[face] =
+        contact_.faces[face].type == FaceType::free && contact_.faces[face].leaving == Leaving::remove;
+  exits.drop_lost = solver_.lost_points == LostPoints::drop;
+  exits.book = [this](auto&&... departing) { book_departures(departing...); };
+  migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_, std::move(exits));
 }
 
 /// Looks at the work of all ranks since the last time, and deals the patches out anew where that evens it out.

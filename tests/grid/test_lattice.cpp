@@ -183,5 +183,44 @@ TEST(Lattice, PatchNodesHoldAllThatItsPointsTouch) {
   for_lattices<2>(check);
 }
 
+/// Positions within 3 rounding errors of both faces, and of a period beyond them.
+TEST(Lattice, WrappedPositionsLieInside) {
+  const double lengths[] = {1.2, 0.7, 0.01, 0.001, 1e-6, 3.0, 1e6};
+  const double lowers[] = {0.0, -0.06, 0.01, 0.003, -0.001, -1.0, -1e-6, 1e-6, 1e6, -1e6, -0.35};
+  int looked_at = 0;
+  for (double lower : lowers)
+    for (double length : lengths)
+      for (int cells : {4, 7, 10, 48, 1000}) {
+        if (std::abs(lower) > 1e9 * length) continue;  // no cell is left of the rounding
+        const double upper = lower + length;
+        const Lattice<2> lattice(Vec<2>(lower, 0), Vec<2>(upper, 1), {cells, 4}, {true, false}, 4);
+        const double period = lattice.length(0);
+        for (double face : {lower, upper, lower - 0.5 * period, upper + 0.5 * period})
+          for (int ulp = -3; ulp <= 3; ++ulp) {
+            double x = face;
+            for (int i = 0; i < std::abs(ulp); ++i) x = std::nextafter(x, ulp < 0 ? -1e300 : 1e300);
+            double wrapped = x;
+            const int periods = lattice.wrap(0, wrapped);
+            const double xi = lattice.scaled(0, wrapped);
+            ASSERT_TRUE(xi >= 0 && xi < cells) << "lower " << lower << " length " << length << " x " << x;
+            ASSERT_NEAR(wrapped + periods * period, x, 8e-16 * (std::abs(lower) + 2 * length));
+            double again = wrapped;
+            ASSERT_EQ(lattice.wrap(0, again), 0);
+            ASSERT_EQ(again, wrapped);
+            ++looked_at;
+          }
+      }
+  EXPECT_GT(looked_at, 9000);
+}
+
+TEST(Lattice, PositionsFarOutsideAreNotWrapped) {
+  const Lattice<2> lattice(Vec<2>(-1, 0), Vec<2>(3, 1), {8, 4}, {true, false}, 4);
+  for (double x : {-6.0, 8.0, 1e30, -1e300, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    double wrapped = x;
+    EXPECT_EQ(lattice.wrap(0, wrapped), 0);
+    EXPECT_TRUE(wrapped == x || std::isnan(x));
+  }
+}
+
 }  // namespace
 }  // namespace cairn

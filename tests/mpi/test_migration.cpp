@@ -156,6 +156,85 @@ TEST(Migration, RoundingErrorsAtAPeriodicBoundaryDoNoHarm) {
   }
 }
 
+TEST(Migration, CrossingsAreCountedBeyond16Bits) {
+  const Lattice<2> lattice(Vec<2>(-0.06, 0), Vec<2>(1.14, 1), {8, 8}, {true, true}, 4);
+  for (const std::int32_t before : {32767, -32768, 2'000'000'000}) {
+    Random random;
+    World<2> world(lattice, {{0, 0, random_point<2>(random, Vec<2>(before > 0 ? 1.1 : 0, 0.1), 1)}}, MPI_COMM_WORLD);
+    world.for_pieces([&](auto& piece) {
+      piece.points.images()[0][0] = before, piece.points.column(0)[0] += before > 0 ? 0.1 : -0.1;
+    });
+    world.migrate();
+    EXPECT_EQ(world.migration->failure(), "");
+    world.for_pieces([&](auto& piece) {
+      if (piece.points.size() == 0) return;
+      EXPECT_EQ(piece.points.images()[0][0], before + (before > 0 ? 1 : -1));
+    });
+  }
+  Random random;
+  World<2> world(lattice, {{0, 0, random_point<2>(random, Vec<2>(1.1, 0.1), 1)}}, MPI_COMM_WORLD);
+  bool here = false;
+  world.for_pieces([&](auto& piece) {
+    piece.points.images()[0][0] = std::numeric_limits<std::int32_t>::max(), piece.points.column(0)[0] += 0.1;
+    here = true;
+  });
+  world.migrate();
+  EXPECT_EQ(world.migration->failure().empty(), !here);
+}
+
+/// A point beyond a face of a world whose right face is open leaves by it, is lost by another, and by both is lost.
+TEST(Migration, PointsLeaveThroughOpenFacesAlone) {
+  const auto lattice = lattice_of<2>({8, 8}, {false, false}, 4);
+  struct Trial {
+    double x, y;
+    bool leaves, lost;
+  };
+  for (const bool drop : {false, true})
+    for (const auto& [x, y, leaves, lost] : {Trial{8.51, 2, true, false}, {8.49, 2, false, false}, {9e9, 6, true, false},
+                                             {-0.51, 2, false, true}, {8.6, 8.6, false, true}, {2, 9, false, true},
+                                             {std::nan(""), 2, false, true}}) {
+      Random random;
+      const Vec<2> start = lattice.lower() + 2.5 * lattice.spacing();
+      World<2> world(lattice, {{5, 3, random_point<2>(random, start, 1)}, {6, 3, random_point<2>(random, start, 1)}},
+                     MPI_COMM_WORLD);
+      Exits<2> exits;
+      exits.open[1] = true, exits.drop_lost = drop;
+      int booked = 0;
+      exits.book = [&](Patch<2>&, const Piece<2>& piece, std::span<const Departure> departing) {
+        ASSERT_EQ(departing.size(), 1U);
+        EXPECT_EQ(piece.points.ids()[departing[0].point], 5);  // still there
+        EXPECT_EQ(departing[0].lost.empty(), leaves);
+        ++booked;
+      };
+      world.migration = std::make_unique<Migration<2>>(*world.messages, world.owner, exits);
+      bool here = false;
+      world.for_pieces([&](auto& piece) {
+        piece.points.column(0)[0] = lattice.lower()[0] + x * lattice.spacing()[0];
+        piece.points.column(1)[0] = lattice.lower()[1] + y * lattice.spacing()[1];
+        here = true;
+      });
+      world.migrate();
+      const bool taken = leaves || (lost && drop);
+      EXPECT_EQ(booked, here && taken);
+      EXPECT_EQ(world.migration->failure().empty(), !here || !lost || drop);
+      std::int64_t points = 0;
+      world.for_pieces([&](auto& piece) { points += piece.points.size(); });
+      MPI_Allreduce(MPI_IN_PLACE, &points, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+      EXPECT_EQ(points, taken ? 1 : 2);
+    }
+}
+
+TEST(Migration, MarkedPointsAreTakenOut) {
+  const auto lattice = lattice_of<2>({8, 8}, {false, false}, 4);
+  Random random;
+  const Vec<2> start = lattice.lower() + 2.5 * lattice.spacing();
+  World<2> world(lattice, {{5, 3, random_point<2>(random, start, 1)}, {0, 3, random_point<2>(random, start, 1)}},
+                 MPI_COMM_WORLD);
+  world.for_pieces([&](auto& piece) { mark_lost(piece.points.ids()[1]); });
+  world.migrate();
+  world.for_pieces([&](auto& piece) { EXPECT_EQ(piece.points.ids(), std::vector<std::int64_t>{5}); });
+}
+
 TEST(Migration, SortingByCellIsStable) {
   const auto lattice = lattice_of<3>({4, 4, 4}, {true, true, true}, 4);
   World<3> world(lattice, make_points(lattice, 400), MPI_COMM_SELF);

@@ -150,11 +150,11 @@ void check_translation(StressUpdate update, const Vec3& velocity, int cells, int
   Case c = soft_case(Dim, cells, patch_cells);
   c.domain.periodic = {true, true, Dim == 3};
   c.solver.stress_update = update;
-  c.time.dt = 0.2 / cells;  // up to a fifth of a cell in a step, across the domain and more in the run
+  c.time.dt = 0.18 / cells;  // up to a fifth of a cell in a step, across the domain and more in the run
   add_body(c, Ball{Vec3(0.31, 0.57, Dim == 3 ? 0.43 : 0), 0.2}, velocity);
   Simulation<Dim> simulation(c, MPI_COMM_WORLD);
   const auto start = points_of(simulation);
-  const int steps = cells * 6;
+  const int steps = cells * 7;
   for (int i = 0; i < steps; ++i) simulation.step(forever);
   const double time = steps * c.time.dt;
   EXPECT_NEAR(simulation.time(), time, 1e-12);
@@ -236,7 +236,7 @@ template <int Dim>
 void check_driven() {
   Case c = soft_case(Dim, 16, 4);
   c.domain.periodic = {true, false, false};
-  c.time.dt = 0.013;
+  c.time.dt = 0.012;
   const Vec3 centre(0.45, 0.5, Dim == 3 ? 0.5 : 0), velocity(0.9, 0.05, 0);
   const Vec3 spin = Dim == 3 ? Vec3(1.1, -0.7, 2.3) : Vec3(0, 0, 2.3);
   add_body(c, BoxShape{centre - Vec3(0.12, 0.2, 0.15), centre + Vec3(0.12, 0.2, 0.15), 0.3});

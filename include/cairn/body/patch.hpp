@@ -21,6 +21,11 @@ struct PatchLedger {
   double filtered = 0;       // taken by the filter of noise, from velocities and spins [J]
   double stopped = 0;        // times that a point was kept from crossing a wall
   double contact_nodes = 0;  // nodes with a contact impulse in the last step
+  // Points that left the domain, those that were lost and dropped, and what both took along. Of rigid bodies the mass
+  // alone counts.
+  double points_left = 0, points_lost = 0;
+  double mass_left = 0, energy_left = 0;                                      // [kg], [J]
+  double momentum_left_x = 0, momentum_left_y = 0, momentum_left_z = 0;  // [kg m/s]
 };
 
 /// One number of the ledger, under the name that it has in files. What moves or keeps a patch goes through this table.
@@ -34,7 +39,14 @@ inline constexpr LedgerColumn ledger_columns[] = {{"contact_dissipation", &Patch
                                                   {"blended_and_spun", &PatchLedger::blended_and_spun},
                                                   {"filtered", &PatchLedger::filtered},
                                                   {"stopped", &PatchLedger::stopped},
-                                                  {"contact_nodes", &PatchLedger::contact_nodes}};
+                                                  {"contact_nodes", &PatchLedger::contact_nodes},
+                                                  {"points_left", &PatchLedger::points_left},
+                                                  {"points_lost", &PatchLedger::points_lost},
+                                                  {"mass_left", &PatchLedger::mass_left},
+                                                  {"energy_left", &PatchLedger::energy_left},
+                                                  {"momentum_left_x", &PatchLedger::momentum_left_x},
+                                                  {"momentum_left_y", &PatchLedger::momentum_left_y},
+                                                  {"momentum_left_z", &PatchLedger::momentum_left_z}};
 
 /// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared.
 template <int Dim>

@@ -27,7 +27,9 @@ struct PointColumns {
 };
 
 /// Crossings of periodic boundaries since the start, for each direction: position + image * period is continuous.
-using Image = std::array<std::int16_t, 4>;
+using Image = std::array<std::int32_t, 4>;
+/// An image as it travels and lies in files of 64-bit words.
+using ImageWords = std::array<std::int64_t, 2>;
 
 template <int Dim>
 class Points {
@@ -66,7 +68,7 @@ class Points {
   void select(std::span<const int> order);
   /// Bytes held.
   std::size_t memory() const {
-    return data_.capacity() * sizeof(double) + ids_.capacity() * 8 + images_.capacity() * 8;
+    return data_.capacity() * sizeof(double) + ids_.capacity() * 8 + images_.capacity() * sizeof(Image);
   }
 
  private:

@@ -25,6 +25,7 @@ struct FaceCondition {
   FaceType type = FaceType::free;
   Vec<Dim> velocity = Vec<Dim>::Zero();  // of a fixed face or wall [m/s]
   std::vector<PairLaw> friction;         // of a wall, for each material
+  Leaving leaving = Leaving::remove;     // of a free face
 };
 
 /// All faces, two for each direction (lower, upper); empty types in periodic directions.

@@ -24,6 +24,10 @@ enum class Surface { whole, cut };
 /// How much of the points' motion that no node sees is taken away (src/solver/noise_filter.cpp).
 enum class NoiseFilter { off, weak, strong, xpic };
 enum class FaceType { free, fixed, symmetry, wall, periodic };
+/// What becomes of points that pass a free face.
+enum class Leaving { remove, stop };
+/// What becomes of points that are nowhere, turned inside out or no numbers.
+enum class LostPoints { stop, drop };
 
 /// How patches are dealt to ranks; never changes a result.
 enum class Partition { metis, round_robin };
@@ -43,6 +47,7 @@ struct SolverOptions {
   Surface surface = Surface::cut;
   NoiseFilter noise_filter = NoiseFilter::weak;
   int noise_order = 4;      // times that motion goes to the nodes and back before what is left counts as noise
+  LostPoints lost_points = LostPoints::stop;
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };
 

@@ -38,6 +38,10 @@ class Lattice {
   double scaled(int d, double x) const { return (x - lower_[d]) * inverse_[d]; }
   double node_position(int d, int i) const { return lower_[d] + i * spacing_[d]; }
 
+  /// Brings a position [m] that is less than a period outside a periodic direction inside, a rounding error short of a
+  /// face onto the last position inside; others stay. Returns the periods taken off: -1, 0 or 1.
+  int wrap(int d, double& x) const;
+
   int patch_count() const { return patch_count_; }
   Index<Dim> patch_position(int patch) const;
   int patch_at(const Index<Dim>& position) const;
@@ -58,8 +62,10 @@ class Lattice {
 
  private:
   std::vector<Link<Dim>> unpaired_links(int patch) const;
+  double last_inside(int d) const;
 
   Vec<Dim> lower_, upper_, spacing_, inverse_;
+  Vec<Dim> last_;  // the largest position that is inside [m]
   Index<Dim> cells_;
   std::array<bool, Dim> periodic_;
   Index<Dim> patches_{};                    // patches in each direction

@@ -24,6 +24,9 @@ struct Domain {
   int patch_cells = 0;          // 32 in 2D, 16 in 3D unless given
 };
 
+/// The shortest side of a cell [m].
+double smallest_cell(const Domain& domain);
+
 struct Time {
   double end = std::numeric_limits<double>::infinity();  // [s]
   std::int64_t steps = std::numeric_limits<std::int64_t>::max();
@@ -65,6 +68,7 @@ struct Face {
   FaceType type = FaceType::free;
   Vec3 velocity = Vec3::Zero();  // of a fixed face or wall [m/s]
   double friction = 0;           // of a wall; may be infinite
+  Leaving leaving = Leaving::remove;  // of a free face
 };
 
 /// When an output is written; several conditions may be given, none means never.

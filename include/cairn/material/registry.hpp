@@ -25,6 +25,9 @@ const LawInfo* find_law(std::string_view model);
 /// Builds the law called `model`; `parameters` holds every key of its table.
 Law make_law(std::string_view model, const ParameterValues& parameters, Plane plane = Plane::strain);
 
+/// Stiffness of a law against longitudinal strain at the start, K + 4G/3 [Pa].
+double longitudinal_modulus(const Law& law);
+
 /// Room for the state variables of any law.
 inline constexpr std::size_t state_capacity = []<class... Laws>(std::type_identity<std::variant<Laws...>>) {
   return std::max({Laws::state_names.size()...});

@@ -1,9 +1,12 @@
 #pragma once
-/// Points that left their patch go to the same body's piece in the patch where they are now.
+/// Points that left their patch go to the same body's piece in the patch where they are now, those that left the domain
+/// through an open face leave the run.
 ///
 /// They are appended in the order (patch they come from, order there), so that pieces are the same on any number of
 /// ranks. Positions are wrapped at periodic boundaries and the crossings counted in the points' images.
 
+#include <functional>
+#include <span>
 #include <string>
 
 #include "cairn/body/patch.hpp"
@@ -11,16 +14,37 @@
 
 namespace cairn {
 
+/// A point that leaves the run.
+struct Departure {
+  int point;         // its place in the piece
+  std::string lost;  // why it is lost; empty where it left through an open face
+};
+
+/// How points leave the run.
+template <int Dim>
+struct Exits {
+  std::array<bool, 2 * Dim> open{};  // faces through which points leave; face = 2 x direction + side
+  bool drop_lost = false;            // lost points leave as well; else they are failures
+  /// Books them before they are taken out.
+  std::function<void(Patch<Dim>&, const Piece<Dim>&, std::span<const Departure>)> book = [](auto&&...) {};
+};
+
+/// Marks a point as lost wherever it is: the next `collect` of its piece takes it out.
+inline void mark_lost(std::int64_t& id) { id = -1 - id; }
+inline bool is_lost(std::int64_t id) { return id < 0; }
+
 template <int Dim>
 class Migration {
  public:
   /// \param owner  the rank of every patch; must outlive this object unchanged
-  Migration(NeighbourExchange& messages, const std::vector<int>& owner) : messages_(messages), owner_(owner) {}
+  Migration(NeighbourExchange& messages, const std::vector<int>& owner, Exits<Dim> exits = {})
+      : messages_(messages), owner_(owner), exits_(std::move(exits)) {}
 
   /// A migration: `begin`, `collect` for every piece, `start`, `finish`.
   void begin();
-  /// Takes out the points that left the patch. Pieces left without points stay as ghosts. A point that left the domain,
-  /// is not finite or moved further than a neighbouring patch stays where it is and is reported by `failure`.
+  /// Takes out the points that left the patch. Pieces left without points stay as ghosts. A point half a cell beyond an
+  /// open face leaves the run. One beyond another face, not finite, or moved further than a neighbouring patch is lost:
+  /// it leaves the run as well, or stays where it is and is reported by `failure`.
   void collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice);
   void start() { messages_.start(); }
   /// Receives those that arrived. Pieces that get points are no longer `projected`.
@@ -29,8 +53,11 @@ class Migration {
   const std::string& failure() const { return failure_; }
 
  private:
+  void send(const Patch<Dim>& patch, const Piece<Dim>& piece, std::vector<std::pair<int, int>>& leaving);
+
   NeighbourExchange& messages_;
   const std::vector<int>& owner_;
+  Exits<Dim> exits_;
   std::string failure_;
 };
 

@@ -8,6 +8,7 @@ namespace cairn {
 /// One body as a whole. Positions are continuous across periodic boundaries.
 struct BodyState {
   int body = 0;
+  int points = 0;                        // that it has now
   double mass = 0;                       // [kg]
   Vec3 centre = Vec3::Zero();            // [m]
   Vec3 velocity = Vec3::Zero();          // [m/s]

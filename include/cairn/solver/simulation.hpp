@@ -25,21 +25,17 @@ struct SolverMaterial {
   std::vector<std::string_view> state_names;
 };
 
-/// Sums over all points and nodes, the same bits on any number of ranks (sums of patch sums in patch order).
-struct Totals {
+/// Sums over all points and nodes, the same bits on any number of ranks (sums of patch sums in patch order), beside
+/// those of the patches' ledgers.
+struct Totals : PatchLedger {
   double kinetic = 0, strain = 0, potential = 0, plastic = 0;  // [J]; rigid bodies are left out
   double viscous = 0;                                          // [J], dissipated in the material; likewise
-  double contact_dissipation = 0, boundary_work = 0;           // [J], since the start
   double numerical = 0;                                        // [J], lost by blending with PIC and in spins
-  double filtered = 0;                                         // [J], taken by the filter of noise
-  double contact_gain = 0;                                     // [J], given by contact where it gave
-  double stopped = 0;                                          // points kept from crossing a wall, since the start
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
-  double mass = 0;                                             // [kg]
-  double contact_nodes = 0;
+  double mass = 0, deformable_mass = 0;                        // [kg]
   double energy() const {
-    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical + filtered -
-           boundary_work;
+    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical + filtered +
+           energy_left - boundary_work;
   }
 };
 
@@ -102,6 +98,8 @@ class Simulation {
   int times_balanced() const { return times_balanced_; }
   double seconds_balancing() const { return seconds_balancing_; }  // of this rank, while patches moved
   const Traffic& traffic() const { return messages_->traffic(); }
+  /// What this rank has to tell of points that were dropped since the last time, a line each.
+  std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
 
   /// Forgets the contacts summed so far. They are kept only where the case writes grains or contacts.
   void clear_contacts() {
@@ -195,6 +193,19 @@ class Simulation {
     return turns_rigidly(piece) ? transfer_of_turning_ : transfer_;
   }
   void look_for_fault(int urgency);
+  /// Updates a piece by update(share of the step, speeds). Where lost points are dropped, those that it turned inside
+  /// out are marked and put to rest, and the update is made once more for no time, for forces and speeds without them.
+  template <class F>
+  void update_guarded(Piece<Dim>& piece, F&& update) {
+    const SpeedLimits before = speeds_;
+    update(1.0, speeds_);
+    if (solver_.lost_points == LostPoints::stop || (std::isfinite(speeds_.wave) && std::isfinite(speeds_.point))) return;
+    mark_faults(piece);
+    speeds_ = before;
+    update(0.0, speeds_);
+  }
+  void mark_faults(Piece<Dim>& piece);
+  void book_departures(Patch<Dim>& patch, const Piece<Dim>& piece, std::span<const Departure> departing);
   void start_speed_reduction();
   void finish_speed_reduction();
 
@@ -227,6 +238,8 @@ class Simulation {
   MaximumReduction maxima_{speed_size};  // wave, point, failure, stop, wall
   int fault_urgency_ = 0;                // of this rank's first fault: the earlier its stage in the step, the more
   std::string fault_;
+  bool marked_ = false;             // points of this rank were marked as lost in the step under way
+  std::vector<std::string> notes_;  // of points that were dropped
   std::function<Notice()> ask_;
 };
 
