@@ -22,7 +22,10 @@ double ContactSweep<Dim>::reduced_mass(const Node& node, const NodePair<Dim>& pa
 /// Of a over its partner, with the impulses found so far.
 template <int Dim>
 Vec<Dim> ContactSweep<Dim>::relative_velocity(const Node& node, const NodePair<Dim>& pair) const {
-  const auto velocity = [&](int i) -> Vec<Dim> { return (momenta_[i] + impulses_[i]) / entries_[node.first + i].mass; };
+  const auto velocity = [&](int i) -> Vec<Dim> {
+    const auto& entry = entries_[node.first + i];
+    return (entry.rigid ? momenta_[i] : Vec<Dim>(momenta_[i] + impulses_[i])) / entry.mass;
+  };
   return velocity(pair.a) - (pair.b == pair.none ? wall_velocities_[pair.face] : velocity(pair.b));
 }
 
@@ -222,11 +225,17 @@ void ContactSweep<Dim>::take_back(const Node& node, double dt) {
     const auto& entry = entries_[node.first + i];
     return (entry.record.projected.norm() + momenta_[i].norm()) / entry.mass;
   };
-  for (int p = node.first_pair; p < node.first_pair + node.pair_count && gain > 0; ++p) {
+  std::vector<std::pair<double, int>> strongest;  // the order of the bodies decides nothing
+  for (int p = node.first_pair; p < node.first_pair + node.pair_count; ++p) {
+    const double size = relative_acceleration(node, pairs_[p]).norm();
+    if (pairs_[p].decision.hold && size > 0) strongest.emplace_back(-size, p);
+  }
+  std::sort(strongest.begin(), strongest.end());
+  for (const auto& [negative, p] : strongest) {
+    if (!(gain > 0)) return;
     const NodePair<Dim>& pair = pairs_[p];
     const Vec<Dim> acceleration = relative_acceleration(node, pair);
-    const double size = acceleration.norm();
-    if (!pair.decision.hold || !(size > 0)) continue;
+    const double size = -negative;
     // Never more than turns the pair's own motion round.
     const double most = 2 * reduced_mass(node, pair) * (motion(pair.a) + (pair.b == pair.none ? 0.0 : motion(pair.b)));
     give(pair, std::min(2 * gain / (dt * size), most) / size * acceleration);

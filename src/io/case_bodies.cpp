@@ -78,7 +78,8 @@ Material read_material(Table table, const std::string& name, int dimension) {
   for (const auto& law : law_infos()) models.push_back(law.name);
   if (!table.has("model")) table.missing("model", "is missing; choose one of " + listed(models));
   const std::size_t choice = table.choose("model", models);
-  material.density = table.number("density", std::nullopt, positive);
+  const bool rigid = choice < models.size() && models[choice] == "rigid";
+  material.density = table.number("density", rigid ? std::optional(1.0) : std::nullopt, positive);
   if (choice >= models.size()) return material;  // without the model the other keys mean nothing
   material.model = models[choice];
   const LawInfo& law = *find_law(material.model);

@@ -95,7 +95,8 @@ Freedom freedom_of(const std::string& key) {
        {"domain.dimension", "domain.lower", "domain.upper", "domain.cells", "domain.periodic", "domain.patch_cells"})
     if (key == fixed) return Freedom::fixed;
   if (starts("materials.") && key.ends_with(".model")) return Freedom::fixed;  // the state variables are the model's
-  for (const char* free : {"title", "time.end", "time.steps", "time.wall_limit", "solver.energy_limit", "solver.lost_points"})
+  for (const char* free :
+       {"title", "time.end", "time.steps", "time.wall_limit", "solver.energy_limit", "solver.lost_points"})
     if (key == free) return Freedom::free;
   if (starts("output.") || starts("parallel.")) return Freedom::free;
   // A table may have moved: whether its content is the same, bodies_checksum says.

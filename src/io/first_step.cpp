@@ -1,7 +1,8 @@
 #include "cairn/io/first_step.hpp"
 
-#include <cmath>
 #include <fmt/format.h>
+
+#include <cmath>
 
 #include "cairn/material/registry.hpp"
 #include "case_sections.hpp"
@@ -61,9 +62,9 @@ void check_time_step(Case& c, Errors& errors) {
   constexpr double near = 0.9;  // share of the limit from which a step is said to be long
   const FirstStep first = first_step(c);
   if (!(c.time.dt > near * first.crossing)) return;
-  const std::string text = fmt::format(
-      "{:.6g} s is {:.3g} of the time that a wave and a point take through a cell at the start, {:.6g} s", c.time.dt,
-      c.time.dt / first.crossing, first.crossing);
+  const std::string text =
+      fmt::format("{:.6g} s is {:.3g} of the time that a wave and a point take through a cell at the start, {:.6g} s",
+                  c.time.dt, c.time.dt / first.crossing, first.crossing);
   if (c.time.dt > first.crossing)
     errors.add({c.file.string(), 0}, "time.dt", text + "; give a smaller one, or leave it to time.cfl");
   else

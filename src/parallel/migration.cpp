@@ -74,7 +74,8 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
     const bool near =
         std::any_of(patch.links.begin(), patch.links.end(), [&](const auto& link) { return link.patch == to; });
     if (place.lost.empty() && to != patch.id && !near)
-      place.lost = fmt::format("point {} of body {} crossed more than a patch in one step", points.ids()[p], piece.body);
+      place.lost =
+          fmt::format("point {} of body {} crossed more than a patch in one step", points.ids()[p], piece.body);
     const bool lost = !place.lost.empty();
     if (lost && !exits_.drop_lost) {
       if (failure_.empty()) failure_ = place.lost;
@@ -94,8 +95,7 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
 
 /// Puts points into the messages: for each pair (patch they go to, point), in that order.
 template <int Dim>
-void Migration<Dim>::send(const Patch<Dim>& patch, const Piece<Dim>& piece,
-                          std::vector<std::pair<int, int>>& leaving) {
+void Migration<Dim>::send(const Patch<Dim>& patch, const Piece<Dim>& piece, std::vector<std::pair<int, int>>& leaving) {
   const Points<Dim>& points = piece.points;
   std::stable_sort(leaving.begin(), leaving.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (std::size_t i = 0; i < leaving.size();) {

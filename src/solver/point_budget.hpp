@@ -6,15 +6,15 @@
 namespace cairn {
 
 struct PointBudget {
-  double mass = 0;                                             // [kg]
-  double kinetic = 0, spin = 0;                                // [J]; spin: the part of kinetic that turns about the point
+  double mass = 0;               // [kg]
+  double kinetic = 0, spin = 0;  // [J]; spin: the part of kinetic that turns about the point
   double strain = 0, potential = 0, plastic = 0, viscous = 0;  // [J]
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]
   double energy() const { return kinetic + strain + potential + plastic + viscous; }
 };
 
-/// Calls f(point, budget) for the points of a piece, which `which(i)` names for i from 0 to count - 1. Of a rigid body's
-/// points only the mass counts.
+/// Calls f(point, budget) for the points of a piece, which `which(i)` names for i from 0 to count - 1. Of a rigid
+/// body's points only the mass counts.
 template <int Dim, class Which, class Visit>
 void for_budgets(const Piece<Dim>& piece, const SolverMaterial& material, bool rigid, const Lattice<Dim>& lattice,
                  const TransferSettings<Dim>& transfer, int count, Which&& which, Visit&& f) {

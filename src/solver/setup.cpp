@@ -265,12 +265,13 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   contact_.chords = c.solver.stress_update == StressUpdate::both;
   bodies_ = make_bodies(c, materials_);
   speeds_.wave = first_step(c).wave_speed;
-  if (bodies_.size() == 1) transfer_.normals_needed = false;  // nothing to touch
   for (int d = 0; d < Dim; ++d)
     for (int side = 0; side < 2; ++side) {
       const FaceType type = contact_.faces[2 * d + side].type;
       transfer_.mirrored[d][side] = type == FaceType::symmetry, transfer_.walled[d][side] = type == FaceType::wall;
     }
+  const bool walls = std::ranges::any_of(contact_.faces, [](const auto& f) { return f.type == FaceType::wall; });
+  transfer_.normals_needed = walls || (bodies_.size() > 1 && transfer_.normals_needed);  // something to touch
   transfer_of_turning_ = transfer_;
   transfer_of_turning_.spin = true;
   if (from)

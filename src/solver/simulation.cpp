@@ -397,8 +397,7 @@ void Simulation<Dim>::connect_patches() {
   for (const auto& patch : patches_) beside_others_.push_back(exchange_->beside_others(patch));
   Exits<Dim> exits;
   for (int face = 0; face < 2 * Dim; ++face)
-    exits.open[face] =
-        contact_.faces[face].type == FaceType::free && contact_.faces[face].leaving == Leaving::remove;
+    exits.open[face] = contact_.faces[face].type == FaceType::free && contact_.faces[face].leaving == Leaving::remove;
   exits.drop_lost = solver_.lost_points == LostPoints::drop;
   exits.book = [this](auto&&... departing) { book_departures(departing...); };
   migration_ = std::make_unique<Migration<Dim>>(*messages_, owner_, std::move(exits));

@@ -20,8 +20,8 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, Sums&
       [&](int, const PointBudget& b) {
         sums[0] += b.mass;
         if (rigid) return;
-        const double values[] = {b.mass,    b.kinetic,     b.spin,        b.strain,     b.potential,
-                                 b.plastic, b.viscous,     b.momentum[0], b.momentum[1], b.momentum[2]};
+        const double values[] = {b.mass,    b.kinetic, b.spin,        b.strain,      b.potential,
+                                 b.plastic, b.viscous, b.momentum[0], b.momentum[1], b.momentum[2]};
         for (int i = 1; i < point_sums; ++i) sums[i] += values[i - 1];
       });
 }

@@ -25,7 +25,8 @@ PROGRESS = re.compile(rf" *{NUMBER} %  t {NUMBER} s  step \d+  dt {NUMBER} s  \d
                       rf"{NUMBER} M point-steps/s/rank  energy error {NUMBER}  left \S+")
 ALL_OUTPUTS = {"output.particles": "{ every = 2 }", "output.grains": "{ every = 2 }",
                "output.contacts": "{ every = 2 }", "output.track": "[0]"}
-FAST = {"bodies.1.velocity": "[20.0, 0.0]", "output.history": "{ every = 1 }"}  # leaves through the right face
+FAST = {"bodies.1.velocity": "[20.0, 0.0]", "output.history": "{ every = 1 }",
+        "boundary.right": '{ type = "free", leaving = "stop" }'}  # ends at the right face
 
 
 def expect(condition, message):

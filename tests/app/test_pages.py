@@ -136,7 +136,7 @@ def main() -> int:
     cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
     problems = check_table_of_cases()
     for page in PAGES:
-        here = scratch / page.stem
+        here = scratch / str(page.relative_to(ROOT)).replace("/", "_")
         here.mkdir()
         problems += check_page(cairn, page, here)
     (scratch / "cases").mkdir()

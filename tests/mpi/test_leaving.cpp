@@ -77,7 +77,8 @@ TEST(Leaving, EveryBookCloses2D) { check_books<2>(leaving_ball(2), 200, 2e-3); }
 TEST(Leaving, EveryBookCloses3D) { check_books<3>(leaving_ball(3), 200, 2e-3); }
 
 TEST(Leaving, TheSameOnAnyNumberOfRanks) {
-  for (StressUpdate update : {StressUpdate::last, StressUpdate::first, StressUpdate::both, StressUpdate::modified_last}) {
+  for (StressUpdate update :
+       {StressUpdate::last, StressUpdate::first, StressUpdate::both, StressUpdate::modified_last}) {
     Case c = leaving_ball(2);
     c.solver.stress_update = update;
     const auto alone = totals_after<2>(c, 200, MPI_COMM_SELF), together = totals_after<2>(c, 200, MPI_COMM_WORLD);

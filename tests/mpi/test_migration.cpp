@@ -190,8 +190,12 @@ TEST(Migration, PointsLeaveThroughOpenFacesAlone) {
     bool leaves, lost;
   };
   for (const bool drop : {false, true})
-    for (const auto& [x, y, leaves, lost] : {Trial{8.51, 2, true, false}, {8.49, 2, false, false}, {9e9, 6, true, false},
-                                             {-0.51, 2, false, true}, {8.6, 8.6, false, true}, {2, 9, false, true},
+    for (const auto& [x, y, leaves, lost] : {Trial{8.51, 2, true, false},
+                                             {8.49, 2, false, false},
+                                             {9e9, 6, true, false},
+                                             {-0.51, 2, false, true},
+                                             {8.6, 8.6, false, true},
+                                             {2, 9, false, true},
                                              {std::nan(""), 2, false, true}}) {
       Random random;
       const Vec<2> start = lattice.lower() + 2.5 * lattice.spacing();

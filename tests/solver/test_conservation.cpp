@@ -95,7 +95,7 @@ Case touching_pair(bool one_body, ContactLaw law, StressUpdate update) {
     add_body(c, block), add_body(c, disk);
   c.contact.law = law;
   c.solver.stress_update = update;
-  c.time.dt = 1e-3;  // a third of a cell at the wave speed
+  c.time.dt = 1e-3;                          // a third of a cell at the wave speed
   c.solver.noise_filter = NoiseFilter::off;  // which looks at each body by itself
   c.solver.surface = Surface::whole;         // a compound with a block is not cut
   return c;

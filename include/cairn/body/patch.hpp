@@ -24,7 +24,7 @@ struct PatchLedger {
   // Points that left the domain, those that were lost and dropped, and what both took along. Of rigid bodies the mass
   // alone counts.
   double points_left = 0, points_lost = 0;
-  double mass_left = 0, energy_left = 0;                                      // [kg], [J]
+  double mass_left = 0, energy_left = 0;                                 // [kg], [J]
   double momentum_left_x = 0, momentum_left_y = 0, momentum_left_z = 0;  // [kg m/s]
 };
 

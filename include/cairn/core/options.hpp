@@ -46,7 +46,7 @@ struct SolverOptions {
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
   Surface surface = Surface::cut;
   NoiseFilter noise_filter = NoiseFilter::weak;
-  int noise_order = 4;      // times that motion goes to the nodes and back before what is left counts as noise
+  int noise_order = 4;  // times that motion goes to the nodes and back before what is left counts as noise
   LostPoints lost_points = LostPoints::stop;
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };
@@ -63,7 +63,7 @@ struct ContactOptions {
   Release release = Release::reaction;
   double friction = 0.3;  // may be infinite
   GapRule gap = GapRule::pressure;
-  double fill = 0.8;  // share of a node that the stand-off leaves filled; for GapRule::fill
+  double fill = 0.8;           // share of a node that the stand-off leaves filled; for GapRule::fill
   double impulse_limit = 0.0;  // gamma of Bardenhagen et al. 2001, eq. 21; 0: off
   NormalSource normals = NormalSource::volume_gradient;
   NormalChoice normal_choice = NormalChoice::common;

@@ -66,8 +66,8 @@ struct Drive {
 
 struct Face {
   FaceType type = FaceType::free;
-  Vec3 velocity = Vec3::Zero();  // of a fixed face or wall [m/s]
-  double friction = 0;           // of a wall; may be infinite
+  Vec3 velocity = Vec3::Zero();       // of a fixed face or wall [m/s]
+  double friction = 0;                // of a wall; may be infinite
   Leaving leaving = Leaving::remove;  // of a free face
 };
 

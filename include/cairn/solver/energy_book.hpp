@@ -1,7 +1,7 @@
 #pragma once
-/// The energies' error over the largest energy seen, and no less than an energy that matters: that of lifting all bodies
-/// by a cell, and of moving them as fast as drives and faces do. Velocities and positions are half a step apart, so that
-/// a body that has just begun to fall has 1/n of its energy too little after n steps, of next to none.
+/// The energies' error over the largest energy seen, and no less than an energy that matters: that of lifting all
+/// bodies by a cell, and of moving them as fast as drives and faces do. Velocities and positions are half a step apart,
+/// so that a body that has just begun to fall has 1/n of its energy too little after n steps, of next to none.
 
 #include <algorithm>
 #include <cmath>

@@ -34,8 +34,8 @@ struct Totals : PatchLedger {
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0, deformable_mass = 0;                        // [kg]
   double energy() const {
-    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical + filtered +
-           energy_left - boundary_work;
+    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical + filtered + energy_left -
+           boundary_work;
   }
 };
 
@@ -199,7 +199,8 @@ class Simulation {
   void update_guarded(Piece<Dim>& piece, F&& update) {
     const SpeedLimits before = speeds_;
     update(1.0, speeds_);
-    if (solver_.lost_points == LostPoints::stop || (std::isfinite(speeds_.wave) && std::isfinite(speeds_.point))) return;
+    if (solver_.lost_points == LostPoints::stop || (std::isfinite(speeds_.wave) && std::isfinite(speeds_.point)))
+      return;
     mark_faults(piece);
     speeds_ = before;
     update(0.0, speeds_);
