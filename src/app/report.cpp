@@ -16,7 +16,9 @@
 namespace cairn::app {
 namespace {
 
-constexpr auto patience = std::chrono::seconds(5);
+using Clock = std::chrono::steady_clock;
+constexpr auto patience = std::chrono::seconds(5), patience_alone = std::chrono::seconds(1);
+constexpr int failed_tag = 13;
 
 /// A communicator of its own, so that reports never meet messages of the work.
 MPI_Comm report_communicator() {
@@ -34,16 +36,41 @@ void print(const Failure& failure) {
   std::fflush(stderr);
 }
 
-/// Waits for all ranks; a rank that failed prints and aborts when they do not come in time.
+/// Whether a rank below this one has failed alone as well, and speaks for all. Ranks that fail at the same time hear of
+/// each other.
+bool lower_rank_speaks() {
+  const MPI_Comm comm = report_communicator();
+  int ranks = 1;
+  MPI_Comm_size(comm, &ranks);
+  for (int higher = rank() + 1; higher < ranks; ++higher) {
+    MPI_Request request = MPI_REQUEST_NULL;
+    MPI_Isend(nullptr, 0, MPI_BYTE, higher, failed_tag, comm, &request);
+    MPI_Request_free(&request);
+  }
+  int heard = 0;
+  for (const auto start = Clock::now(); !heard && Clock::now() - start < std::chrono::milliseconds(500);) {
+    MPI_Iprobe(MPI_ANY_SOURCE, failed_tag, comm, &heard, MPI_STATUS_IGNORE);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return heard != 0;
+}
+
+/// Ends the job where ranks failed that the others wait for.
+void end_job(const Failure& failure) {
+  if (lower_rank_speaks())
+    std::this_thread::sleep_for(patience);  // its end is that of all
+  else
+    print(failure);
+  MPI_Abort(MPI_COMM_WORLD, failed);
+}
+
+/// Waits for all ranks; those that failed end the job when the others do not come in time.
 void wait_for_all(MPI_Request& request, const std::optional<Failure>& failure) {
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   for (int arrived = 0; !arrived;) {
     MPI_Test(&request, &arrived, MPI_STATUS_IGNORE);
     if (arrived) return;
-    if (failure && std::chrono::steady_clock::now() - start > patience) {
-      print(*failure);
-      MPI_Abort(MPI_COMM_WORLD, failed);
-    }
+    if (failure && Clock::now() - start > (failure->alone ? patience_alone : patience)) end_job(*failure);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
 }
@@ -95,6 +122,8 @@ std::optional<Failure> attempt(const std::function<void()>& work) {
                                             count, count == 1 ? "" : "s")};
   } catch (const RunError& error) {
     return Failure{failed, fmt::format("cairn failed: {}", error.what())};
+  } catch (const RankError& error) {
+    return Failure{failed, fmt::format("cairn failed: {}", error.what()), true};
   } catch (const std::bad_alloc&) {
     return Failure{failed, "cairn failed: out of memory; use fewer points or more ranks"};
   } catch (const std::exception& error) {

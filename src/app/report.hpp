@@ -3,7 +3,7 @@
 ///
 /// Work that may throw runs inside `attempt`; all ranks then meet in `settle`. If the failing ranks are met there by
 /// all others, the lowest failing rank prints and every rank gets its exit code. If the others do not come within a
-/// time limit, they wait for the failing rank somewhere in the work: it prints and aborts the run.
+/// time limit, they wait for the failing rank somewhere in the work: the lowest that failed prints and aborts the run.
 
 #include <functional>
 #include <optional>
@@ -13,8 +13,9 @@
 namespace cairn::app {
 
 struct Failure {
-  int code;          // exit code
-  std::string text;  // the whole report
+  int code;            // exit code
+  std::string text;    // the whole report
+  bool alone = false;  // the other ranks are known to wait in the work
 };
 
 int rank();

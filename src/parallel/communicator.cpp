@@ -43,6 +43,22 @@ std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm)
   return all;
 }
 
+RollCall::RollCall(MPI_Comm comm) { MPI_Comm_dup(comm, &comm_); }
+
+RollCall::~RollCall() {
+  if (std::uncaught_exceptions() == 0) MPI_Comm_free(&comm_);
+}
+
+bool RollCall::all_here() {
+  constexpr double patience = 2;  // [s]
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Ibarrier(comm_, &request);
+  int here = 0;
+  for (const double start = MPI_Wtime(); !here && MPI_Wtime() - start < patience;)
+    MPI_Test(&request, &here, MPI_STATUS_IGNORE);
+  return here != 0;
+}
+
 void MaximumReduction::start(std::span<const double> mine, MPI_Comm comm) {
   std::copy(mine.begin(), mine.end(), mine_.begin());
   MPI_Iallreduce(mine_.data(), largest_.data(), static_cast<int>(mine_.size()), MPI_DOUBLE, MPI_MAX, comm, &request_);
@@ -69,7 +85,7 @@ NeighbourExchange::~NeighbourExchange() {
 std::size_t NeighbourExchange::slot(int rank) const {
   if (rank == rank_) return neighbours_.size();
   const auto at = std::lower_bound(neighbours_.begin(), neighbours_.end(), rank);
-  if (at == neighbours_.end() || *at != rank) throw RunError("a message is addressed to a rank that is no neighbour");
+  if (at == neighbours_.end() || *at != rank) throw RankError("a message is addressed to a rank that is no neighbour");
   return static_cast<std::size_t>(at - neighbours_.begin());
 }
 
@@ -78,7 +94,7 @@ void NeighbourExchange::start() {
   for (std::size_t i = 0; i < neighbours_.size(); ++i) {
     auto& words = outgoing_[i].words();
     if (words.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-      throw RunError("a message to a neighbour exceeds 16 GiB: use more ranks");
+      throw RankError("a message to a neighbour exceeds 16 GiB: use more ranks");
     MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], exchange_tag, comm_,
               &requests_[i]);
     ++traffic_.messages;

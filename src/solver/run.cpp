@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <new>
+
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/case_changes.hpp"
@@ -42,6 +44,7 @@ class Run {
       : case_(c),
         settings_(settings),
         comm_(comm),
+        roll_call_(comm),
         start_(wall_clock()),
         simulation_(c, comm, from),
         particles_(c.output.particles),
@@ -62,7 +65,24 @@ class Run {
     open_files(from);
   }
 
+  /// \throws RunError on every rank, or RankError on those that failed alone
   int execute() {
+    try {
+      return work();
+    } catch (const RunError& error) {
+      if (roll_call_.all_here()) throw;
+      throw RankError(alone(error.what()));
+    } catch (const RankError&) {
+      throw;
+    } catch (const std::bad_alloc&) {
+      throw RankError(alone("out of memory; use fewer points or more ranks"));
+    } catch (const std::exception& error) {
+      throw RankError(alone(error.what()));
+    }
+  }
+
+ private:
+  int work() {
     if (steps_before_ == 0) write_outputs(true, 0);
     const double stepping = wall_clock();
     double output_wall = 0;
@@ -89,7 +109,10 @@ class Run {
     return done;
   }
 
- private:
+  std::string alone(const std::string& reason) const {
+    return fmt::format("rank {} after step {}: {}", rank_, simulation_.steps(), reason);
+  }
+
   bool running() const { return simulation_.time() < case_.time.end && simulation_.steps() < case_.time.steps; }
 
   /// One step, and what the ranks told each other in it.
@@ -98,6 +121,7 @@ class Run {
       simulation_.step(case_.time.end - simulation_.time());
       return simulation_.notice();
     } catch (const RunError& error) {
+      if (!roll_call_.all_here()) throw RankError(alone(error.what()));
       fail(error.what());
     }
   }
@@ -173,6 +197,7 @@ class Run {
 
   /// Writes what is due; with `all`, everything that is active and not written at this step yet.
   void write_outputs(bool all, double wall) {
+    const auto measured = simulation_.timers().measure(Stage::output);
     const std::int64_t step = simulation_.steps();
     const double time = simulation_.time();
     const auto wanted = [&](OutputClock& clock) {
@@ -324,6 +349,7 @@ class Run {
   const RunSettings& settings_;
   MPI_Comm comm_;
   int rank_ = 0, ranks_ = 1;
+  RollCall roll_call_;
   StopSignals signals_;
   double start_;
   Simulation<Dim> simulation_;

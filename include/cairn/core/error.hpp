@@ -1,5 +1,5 @@
 #pragma once
-/// The two ways a run ends early: the input is wrong (exit 2), or the run failed (exit 3).
+/// The ways a run ends early: the input is wrong (exit 2), or the run failed (exit 3), on all ranks or on one.
 
 #include <stdexcept>
 #include <string>
@@ -24,8 +24,14 @@ class InputError : public std::runtime_error {
   std::vector<std::string> messages_;
 };
 
-/// The run failed: says at which step, where and why.
+/// The run failed, and every rank knows it: says at which step, where and why.
 class RunError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// One rank failed, and the others do not know: they may wait for it anywhere, so that nothing collective can follow.
+class RankError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };

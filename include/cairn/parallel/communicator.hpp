@@ -42,6 +42,23 @@ struct Traffic {
 /// end.
 bool wait_or_leave(std::span<MPI_Request> requests);
 
+/// Tells whether an error is that of all ranks, or of some alone while others wait for them. Both calls collective.
+class RollCall {
+ public:
+  explicit RollCall(MPI_Comm comm);
+  ~RollCall();
+  RollCall(const RollCall&) = delete;
+  RollCall& operator=(const RollCall&) = delete;
+  RollCall(RollCall&&) = delete;
+  RollCall& operator=(RollCall&&) = delete;
+
+  /// False where some rank does not call it within two seconds: nothing collective can follow then.
+  bool all_here();
+
+ private:
+  MPI_Comm comm_ = MPI_COMM_NULL;  // of its own: what others wait in is never mistaken for the call
+};
+
 /// The numbers of all ranks one after the other, in the order of the ranks, on rank 0; none elsewhere. Collective.
 std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm);
 

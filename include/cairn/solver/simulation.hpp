@@ -95,6 +95,7 @@ class Simulation {
   const std::vector<int>& owner() const { return owner_; }
   MPI_Comm communicator() const { return comm_; }
   const StageTimers& timers() const { return timers_; }
+  StageTimers& timers() { return timers_; }
   int times_balanced() const { return times_balanced_; }
   double seconds_balancing() const { return seconds_balancing_; }  // of this rank, while patches moved
   const Traffic& traffic() const { return messages_->traffic(); }
