@@ -14,8 +14,6 @@ Lattice<Dim>::Lattice(const Vec<Dim>& lower, const Vec<Dim>& upper, const Index<
     last_[d] = last_inside(d);
     patches_[d] = std::max(1, cells[d] / patch_cells);
     patch_count_ *= patches_[d];
-    for (int i = 0; i <= patches_[d]; ++i)
-      cuts_[d].push_back(static_cast<int>(static_cast<std::int64_t>(i) * cells[d] / patches_[d]));
   }
 }
 
@@ -41,29 +39,29 @@ int Lattice<Dim>::wrap(int d, double& x) const {
 }
 
 template <int Dim>
-int Lattice<Dim>::patch_at(const Index<Dim>& position) const {
-  int id = 0;
+PatchId Lattice<Dim>::patch_at(const Index<Dim>& position) const {
+  PatchId id = 0;
   for (int d = Dim - 1; d >= 0; --d) id = id * patches_[d] + position[d];
   return id;
 }
 
 template <int Dim>
-Index<Dim> Lattice<Dim>::patch_position(int patch) const {
+Index<Dim> Lattice<Dim>::patch_position(PatchId patch) const {
   Index<Dim> position;
-  for (int d = 0; d < Dim; ++d) position[d] = patch % patches_[d], patch /= patches_[d];
+  for (int d = 0; d < Dim; ++d) position[d] = static_cast<int>(patch % patches_[d]), patch /= patches_[d];
   return position;
 }
 
 template <int Dim>
-Box<Dim> Lattice<Dim>::patch_cells(int patch) const {
+Box<Dim> Lattice<Dim>::patch_cells(PatchId patch) const {
   const Index<Dim> position = patch_position(patch);
   Box<Dim> box;
-  for (int d = 0; d < Dim; ++d) box.lower[d] = cuts_[d][position[d]], box.upper[d] = cuts_[d][position[d] + 1];
+  for (int d = 0; d < Dim; ++d) box.lower[d] = cut(d, position[d]), box.upper[d] = cut(d, position[d] + 1);
   return box;
 }
 
 template <int Dim>
-Box<Dim> Lattice<Dim>::patch_nodes(int patch) const {
+Box<Dim> Lattice<Dim>::patch_nodes(PatchId patch) const {
   Box<Dim> box = patch_cells(patch);
   for (int d = 0; d < Dim; ++d) {
     box.lower[d] -= !periodic_[d] && box.lower[d] == 0 ? 2 : 1;
@@ -73,22 +71,22 @@ Box<Dim> Lattice<Dim>::patch_nodes(int patch) const {
 }
 
 template <int Dim>
-std::array<double, 2> Lattice<Dim>::patch_reach(int patch, int d) const {
+std::array<double, 2> Lattice<Dim>::patch_reach(PatchId patch, int d) const {
   const Box<Dim> box = patch_cells(patch);
   const bool first = !periodic_[d] && box.lower[d] == 0, last = !periodic_[d] && box.upper[d] == cells_[d];
   return {box.lower[d] - (first ? 0.5 : 0.0), box.upper[d] + (last ? 0.5 : 0.0)};
 }
 
 template <int Dim>
-int Lattice<Dim>::patch_of_cell(const Index<Dim>& cell) const {
+PatchId Lattice<Dim>::patch_of_cell(const Index<Dim>& cell) const {
   Index<Dim> position;
-  for (int d = 0; d < Dim; ++d)
-    position[d] = static_cast<int>(std::upper_bound(cuts_[d].begin(), cuts_[d].end(), cell[d]) - cuts_[d].begin()) - 1;
+  for (int d = 0; d < Dim; ++d)  // the last whose first cell is not beyond this one
+    position[d] = static_cast<int>(((cell[d] + std::int64_t{1}) * patches_[d] - 1) / cells_[d]);
   return patch_at(position);
 }
 
 template <int Dim>
-bool Lattice<Dim>::owns_node(int patch, const Index<Dim>& node) const {
+bool Lattice<Dim>::owns_node(PatchId patch, const Index<Dim>& node) const {
   const Box<Dim> box = patch_cells(patch);
   for (int d = 0; d < Dim; ++d) {
     const bool first = !periodic_[d] && box.lower[d] == 0, last = !periodic_[d] && box.upper[d] == cells_[d];
@@ -98,7 +96,7 @@ bool Lattice<Dim>::owns_node(int patch, const Index<Dim>& node) const {
 }
 
 template <int Dim>
-std::vector<Link<Dim>> Lattice<Dim>::unpaired_links(int patch) const {
+std::vector<Link<Dim>> Lattice<Dim>::unpaired_links(PatchId patch) const {
   const Index<Dim> position = patch_position(patch);
   std::vector<Link<Dim>> links;
   Box<Dim> around;
@@ -127,7 +125,7 @@ std::vector<Link<Dim>> Lattice<Dim>::unpaired_links(int patch) const {
 }
 
 template <int Dim>
-std::vector<Link<Dim>> Lattice<Dim>::links(int patch) const {
+std::vector<Link<Dim>> Lattice<Dim>::links(PatchId patch) const {
   auto links = unpaired_links(patch);
   for (auto& link : links) {
     const auto back = unpaired_links(link.patch);

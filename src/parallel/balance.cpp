@@ -24,7 +24,7 @@ void put_piece(const Piece<Dim>& piece, Message& message) {
 /// Pieces with points only: ghosts come back with the next exchange.
 template <int Dim>
 void put_patch(const Patch<Dim>& patch, Message& message) {
-  message.put(std::int64_t{patch.id});
+  message.put(patch.id);
   for (const auto& column : ledger_columns) message.put(patch.ledger.*column.value);
   message.put(static_cast<std::int64_t>(patch.contacts.size()));
   for (const auto& [pair, sum] : patch.contacts) {
@@ -39,7 +39,7 @@ void put_patch(const Patch<Dim>& patch, Message& message) {
 
 template <int Dim>
 Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim>& lattice) {
-  Patch<Dim> patch(static_cast<int>(message.integer(at++)), lattice);
+  Patch<Dim> patch(message.integer(at++), lattice);
   for (const auto& column : ledger_columns) patch.ledger.*column.value = *message.data(at++);
   for (std::int64_t n = message.integer(at++); n > 0; --n) {
     const int a = static_cast<int>(message.integer(at++)), b = static_cast<int>(message.integer(at++));
@@ -93,15 +93,17 @@ std::vector<int> keep_in_place(const std::vector<int>& parts, const std::vector<
 }
 
 template <int Dim>
-void move_patches(std::vector<Patch<Dim>>& patches, std::vector<int>& owner, const std::vector<int>& new_owner,
+void move_patches(std::vector<Patch<Dim>>& patches, PatchTable<Dim>& table, const std::vector<int>& new_owner,
                   const Lattice<Dim>& lattice, MPI_Comm comm) {
+  const std::vector<int> owner = table.owners();
+  table.assign(new_owner);
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
   std::vector<Message> outgoing(ranks);
   for (const auto& patch : patches)
-    if (new_owner[patch.id] != rank) put_patch(patch, outgoing[new_owner[patch.id]]);
-  std::erase_if(patches, [&](const auto& patch) { return new_owner[patch.id] != rank; });
+    if (const int to = table.owner(patch.id); to != rank) put_patch(patch, outgoing[to]);
+  std::erase_if(patches, [&](const auto& patch) { return table.owner(patch.id) != rank; });
 
   // Every rank knows from the two tables whom it will hear from.
   std::vector<bool> hears_from(ranks, false);
@@ -124,12 +126,11 @@ void move_patches(std::vector<Patch<Dim>>& patches, std::vector<int>& owner, con
   }
   MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
   std::sort(patches.begin(), patches.end(), [](const auto& a, const auto& b) { return a.id < b.id; });
-  owner = new_owner;
 }
 
-template void move_patches(std::vector<Patch<2>>&, std::vector<int>&, const std::vector<int>&, const Lattice<2>&,
+template void move_patches(std::vector<Patch<2>>&, PatchTable<2>&, const std::vector<int>&, const Lattice<2>&,
                            MPI_Comm);
-template void move_patches(std::vector<Patch<3>>&, std::vector<int>&, const std::vector<int>&, const Lattice<3>&,
+template void move_patches(std::vector<Patch<3>>&, PatchTable<3>&, const std::vector<int>&, const Lattice<3>&,
                            MPI_Comm);
 
 }  // namespace cairn

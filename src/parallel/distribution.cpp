@@ -2,6 +2,8 @@
 
 #include <metis.h>
 
+#include <algorithm>
+
 #include "cairn/core/error.hpp"
 
 namespace cairn {
@@ -13,17 +15,19 @@ struct Graph {
 };
 
 template <int Dim>
-Graph build_graph(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& work) {
+Graph build_graph(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
+                  const std::vector<std::int64_t>& work) {
   Graph graph;
   // METIS adds weights in idx_t: scale so that sums stay far from its range. One more for each patch spreads empty
   // ones.
   std::int64_t total = 0;
   for (auto w : work) total += w;
   const std::int64_t unit = 1 + total / (std::int64_t{1} << 28);
-  for (int patch = 0; patch < lattice.patch_count(); ++patch) {
-    std::vector<std::pair<int, std::size_t>> shared;
-    for (const auto& link : lattice.links(patch)) {
-      if (link.patch == patch) continue;
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    const PatchId patch = patches[p];
+    std::vector<std::pair<PatchId, std::size_t>> shared;
+    for (const auto& link : lattice.unpaired_links(patch)) {
+      if (link.patch == patch || !std::ranges::binary_search(patches, link.patch)) continue;
       const auto nodes =
           intersection(lattice.patch_nodes(patch), lattice.patch_nodes(link.patch).shifted(link.shift)).size();
       if (!shared.empty() && shared.back().first == link.patch)
@@ -32,34 +36,43 @@ Graph build_graph(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& 
         shared.emplace_back(link.patch, nodes);
     }
     for (const auto& [neighbour, nodes] : shared) {
-      graph.neighbours.push_back(neighbour);
+      graph.neighbours.push_back(static_cast<idx_t>(std::ranges::lower_bound(patches, neighbour) - patches.begin()));
       graph.edge_weights.push_back(static_cast<idx_t>(nodes));
     }
     graph.starts.push_back(static_cast<idx_t>(graph.neighbours.size()));
-    graph.vertex_weights.push_back(static_cast<idx_t>(1 + work[patch] / unit));
+    graph.vertex_weights.push_back(static_cast<idx_t>(1 + work[p] / unit));
   }
   return graph;
+}
+
+/// Place of a patch on the curve of Morton (1966): the bits of its position taken in turn.
+template <int Dim>
+std::uint64_t place_on_curve(const Lattice<Dim>& lattice, PatchId patch) {
+  const Index<Dim> position = lattice.patch_position(patch);
+  std::uint64_t code = 0;
+  for (int bit = 0; bit < 64 / Dim; ++bit)
+    for (int d = 0; d < Dim; ++d) code |= (static_cast<std::uint64_t>(position[d]) >> bit & 1) << (bit * Dim + d);
+  return code;
 }
 
 }  // namespace
 
 template <int Dim>
-std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& work, int ranks,
-                                    Partition partition) {
-  const int patches = lattice.patch_count();
-  std::vector<int> owner(patches, 0);
+std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
+                                    const std::vector<std::int64_t>& work, int ranks, Partition partition) {
+  std::vector<int> owner(patches.size(), 0);
   if (ranks == 1) return owner;
-  if (partition == Partition::round_robin || patches <= ranks) {
-    for (int p = 0; p < patches; ++p) owner[p] = p % ranks;
+  if (partition == Partition::round_robin || std::ssize(patches) <= ranks) {
+    for (std::size_t p = 0; p < owner.size(); ++p) owner[p] = static_cast<int>(p % ranks);
     return owner;
   }
-  Graph graph = build_graph(lattice, work);
-  idx_t vertices = patches, constraints = 1, parts = ranks, cut = 0;
+  Graph graph = build_graph(lattice, patches, work);
+  idx_t vertices = static_cast<idx_t>(patches.size()), constraints = 1, parts = ranks, cut = 0;
   idx_t options[METIS_NOPTIONS];
   METIS_SetDefaultOptions(options);
   options[METIS_OPTION_SEED] = 1;
   options[METIS_OPTION_UFACTOR] = 20;  // imbalance up to 1.02
-  std::vector<idx_t> part(patches, 0);
+  std::vector<idx_t> part(patches.size(), 0);
   const auto method = ranks <= 8 ? METIS_PartGraphRecursive : METIS_PartGraphKway;
   const int status =
       method(&vertices, &constraints, graph.starts.data(), graph.neighbours.data(), graph.vertex_weights.data(),
@@ -69,7 +82,88 @@ std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vect
   return owner;
 }
 
-template std::vector<int> distribute_patches(const Lattice<2>&, const std::vector<std::int64_t>&, int, Partition);
-template std::vector<int> distribute_patches(const Lattice<3>&, const std::vector<std::int64_t>&, int, Partition);
+template <int Dim>
+PatchTable<Dim>::PatchTable(const Lattice<Dim>& lattice, const std::vector<PatchId>& filled,
+                            const std::vector<PatchId>& kept)
+    : lattice_(&lattice), steps_{{0, 0}} {
+  restrict_to(filled, kept);
+}
+
+template <int Dim>
+void PatchTable<Dim>::restrict_to(const std::vector<PatchId>& filled, const std::vector<PatchId>& kept) {
+  patches_.clear(), filled_.clear();
+  std::vector<PatchId> others = kept;
+  insert(others);
+  fill(filled);
+}
+
+template <int Dim>
+std::ptrdiff_t PatchTable<Dim>::find(PatchId patch) const {
+  const auto at = std::ranges::lower_bound(patches_, patch);
+  return at != patches_.end() && *at == patch ? at - patches_.begin() : -1;
+}
+
+template <int Dim>
+int PatchTable<Dim>::owner(PatchId patch) const {
+  if (steps_.size() == 1) return steps_.front().owner;
+  const auto after = std::ranges::upper_bound(steps_, place_on_curve(*lattice_, patch), {}, &Step::code);
+  return after == steps_.begin() ? steps_.front().owner : std::prev(after)->owner;
+}
+
+template <int Dim>
+std::vector<int> PatchTable<Dim>::owners() const {
+  std::vector<int> owners;
+  for (const PatchId patch : patches_) owners.push_back(owner(patch));
+  return owners;
+}
+
+template <int Dim>
+void PatchTable<Dim>::assign(const std::vector<int>& owners) {
+  steps_.clear();
+  for (std::size_t p = 0; p < patches_.size(); ++p)
+    steps_.push_back({place_on_curve(*lattice_, patches_[p]), owners[p]});
+  std::ranges::sort(steps_, {}, &Step::code);
+  steps_.erase(
+      std::unique(steps_.begin(), steps_.end(), [](const Step& a, const Step& b) { return a.owner == b.owner; }),
+      steps_.end());
+  if (steps_.empty()) steps_.push_back({0, 0});
+}
+
+/// Adds patches that are not in the table yet; leaves those that were added, ascending.
+template <int Dim>
+void PatchTable<Dim>::insert(std::vector<PatchId>& patches) {
+  std::ranges::sort(patches);
+  patches.erase(std::unique(patches.begin(), patches.end()), patches.end());
+  std::erase_if(patches, [&](PatchId patch) { return find(patch) >= 0; });
+  if (patches.empty()) return;
+  std::vector<PatchId> all;
+  std::vector<bool> filled;
+  for (std::size_t old = 0, added = 0; old < patches_.size() || added < patches.size();) {
+    const bool take_old = added == patches.size() || (old < patches_.size() && patches_[old] < patches[added]);
+    filled.push_back(take_old && filled_[old]);
+    all.push_back(take_old ? patches_[old++] : patches[added++]);
+  }
+  patches_ = std::move(all), filled_ = std::move(filled);
+}
+
+template <int Dim>
+std::vector<PatchId> PatchTable<Dim>::fill(const std::vector<PatchId>& patches) {
+  std::vector<PatchId> added;
+  for (const PatchId patch : patches) {
+    if (is_filled(patch)) continue;
+    added.push_back(patch);
+    for (const auto& link : lattice_->unpaired_links(patch)) added.push_back(link.patch);
+  }
+  insert(added);
+  for (const PatchId patch : patches) filled_[find(patch)] = true;
+  return added;
+}
+
+template class PatchTable<2>;
+template class PatchTable<3>;
+template std::vector<int> distribute_patches(const Lattice<2>&, const std::vector<PatchId>&,
+                                             const std::vector<std::int64_t>&, int, Partition);
+template std::vector<int> distribute_patches(const Lattice<3>&, const std::vector<PatchId>&,
+                                             const std::vector<std::int64_t>&, int, Partition);
 
 }  // namespace cairn

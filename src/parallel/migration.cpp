@@ -44,7 +44,7 @@ Place<Dim> locate(Points<Dim>& points, int p, int body, const Lattice<Dim>& latt
 }  // namespace
 
 template <int Dim>
-bool all_inside(const Piece<Dim>& piece, const Lattice<Dim>& lattice, int patch) {
+bool all_inside(const Piece<Dim>& piece, const Lattice<Dim>& lattice, PatchId patch) {
   for (int d = 0; d < Dim; ++d) {
     const double* x = piece.points.column(d);
     const auto [lower, upper] = lattice.patch_reach(patch, d);
@@ -62,7 +62,7 @@ template <int Dim>
 void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice<Dim>& lattice) {
   Points<Dim>& points = piece.points;
   std::vector<int> staying;
-  std::vector<std::pair<int, int>> leaving;  // patch, point
+  std::vector<std::pair<PatchId, int>> leaving;  // patch, point
   std::vector<Departure> departing;
   for (int p = 0; p < points.size(); ++p) {
     if (is_lost(points.ids()[p])) {
@@ -70,7 +70,7 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
       continue;
     }
     Place<Dim> place = locate(points, p, piece.body, lattice, exits_);
-    const int to = place.left ? patch.id : lattice.patch_of_cell(place.cell);
+    const PatchId to = place.left ? patch.id : lattice.patch_of_cell(place.cell);
     const bool near =
         std::any_of(patch.links.begin(), patch.links.end(), [&](const auto& link) { return link.patch == to; });
     if (place.lost.empty() && to != patch.id && !near)
@@ -95,15 +95,18 @@ void Migration<Dim>::collect(Patch<Dim>& patch, Piece<Dim>& piece, const Lattice
 
 /// Puts points into the messages: for each pair (patch they go to, point), in that order.
 template <int Dim>
-void Migration<Dim>::send(const Patch<Dim>& patch, const Piece<Dim>& piece, std::vector<std::pair<int, int>>& leaving) {
+void Migration<Dim>::send(const Patch<Dim>& patch, const Piece<Dim>& piece,
+                          std::vector<std::pair<PatchId, int>>& leaving) {
   const Points<Dim>& points = piece.points;
   std::stable_sort(leaving.begin(), leaving.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   for (std::size_t i = 0; i < leaving.size();) {
     std::size_t end = i;
     while (end < leaving.size() && leaving[end].first == leaving[i].first) ++end;
-    Message& message = messages_.outgoing(owner_[leaving[i].first]);
-    for (std::int64_t value : {std::int64_t{leaving[i].first}, std::int64_t{patch.id}, std::int64_t{piece.body},
-                               static_cast<std::int64_t>(end - i), std::int64_t{points.columns()}})
+    const PatchId to = leaving[i].first;
+    if (!table_.is_filled(to)) entered_.push_back(to);
+    Message& message = messages_.outgoing(table_.owner(to));
+    for (std::int64_t value :
+         {to, patch.id, std::int64_t{piece.body}, static_cast<std::int64_t>(end - i), std::int64_t{points.columns()}})
       message.put(value);
     for (; i < end; ++i) {
       const int p = leaving[i].second;
@@ -118,13 +121,15 @@ template <int Dim>
 void Migration<Dim>::begin() {
   messages_.begin();
   failure_.clear();
+  entered_.clear();
 }
 
 template <int Dim>
 void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
   messages_.receive();
   struct Arrival {
-    int to, from, body, count, columns, rank;
+    PatchId to, from;
+    int body, count, columns, rank;
     std::size_t at;
   };
   std::vector<Arrival> arrivals;
@@ -132,7 +137,7 @@ void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
     const Message& message = messages_.incoming(rank);
     for (std::size_t at = 0; at < message.size();) {
       Arrival a;
-      a.to = static_cast<int>(message.integer(at++)), a.from = static_cast<int>(message.integer(at++));
+      a.to = message.integer(at++), a.from = message.integer(at++);
       a.body = static_cast<int>(message.integer(at++)), a.count = static_cast<int>(message.integer(at++));
       a.columns = static_cast<int>(message.integer(at++)), a.rank = rank, a.at = at;
       at += static_cast<std::size_t>(a.count) * (3 + a.columns);
@@ -146,7 +151,7 @@ void Migration<Dim>::finish(std::vector<Patch<Dim>>& patches) {
   });
   for (const Arrival& a : arrivals) {
     auto patch =
-        std::lower_bound(patches.begin(), patches.end(), a.to, [](const auto& p, int id) { return p.id < id; });
+        std::lower_bound(patches.begin(), patches.end(), a.to, [](const auto& p, PatchId id) { return p.id < id; });
     Piece<Dim>& piece = patch->piece_of(a.body, 0);
     piece.projected = false;
     Points<Dim>& points = piece.points;
@@ -184,8 +189,8 @@ void sort_by_cell(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Box<Dim>
 
 template class Migration<2>;
 template class Migration<3>;
-template bool all_inside(const Piece<2>&, const Lattice<2>&, int);
-template bool all_inside(const Piece<3>&, const Lattice<3>&, int);
+template bool all_inside(const Piece<2>&, const Lattice<2>&, PatchId);
+template bool all_inside(const Piece<3>&, const Lattice<3>&, PatchId);
 template void sort_by_cell(Piece<2>&, const Lattice<2>&, const Box<2>&);
 template void sort_by_cell(Piece<3>&, const Lattice<3>&, const Box<3>&);
 

@@ -75,16 +75,24 @@ Index<Dim> negated(Index<Dim> shift) {
 }  // namespace
 
 template <int Dim>
-NodeExchange<Dim>::NodeExchange(NeighbourExchange& messages, const std::vector<int>& owner,
+NodeExchange<Dim>::NodeExchange(NeighbourExchange& messages, const PatchTable<Dim>& table,
                                 const std::vector<Patch<Dim>>& patches)
-    : messages_(messages), owner_(owner), sent_(patches.size()), parts_(patches.size()), position_(owner.size(), -1) {
-  for (std::size_t p = 0; p < patches.size(); ++p) position_[patches[p].id] = static_cast<int>(p);
+    : messages_(messages), sent_(patches.size()), parts_(patches.size()) {
+  for (const auto& patch : patches) {
+    ids_.push_back(patch.id);
+    auto& ranks = ranks_.emplace_back();
+    for (const auto& link : patch.links) ranks.push_back(table.find(link.patch) < 0 ? -1 : table.owner(link.patch));
+  }
 }
 
 template <int Dim>
-bool NodeExchange<Dim>::beside_others(const Patch<Dim>& patch) const {
-  return std::any_of(patch.links.begin(), patch.links.end(),
-                     [&](const Link<Dim>& link) { return owner_[link.patch] != messages_.rank(); });
+bool NodeExchange<Dim>::beside_others(std::size_t p) const {
+  return std::ranges::any_of(ranks_[p], [&](int rank) { return rank >= 0 && rank != messages_.rank(); });
+}
+
+template <int Dim>
+std::vector<typename NodeExchange<Dim>::Part>& NodeExchange<Dim>::parts_of(PatchId patch) {
+  return parts_[std::ranges::lower_bound(ids_, patch) - ids_.begin()];
 }
 
 template <int Dim>
@@ -121,11 +129,12 @@ template <int Dim>
 void NodeExchange<Dim>::put_with_boxes(Patch<Dim>& patch, std::size_t p) {
   for (std::size_t l = 0; l < patch.links.size(); ++l) {
     const Link<Dim>& link = patch.links[l];
-    Message& message = messages_.outgoing(owner_[link.patch]);
+    const int rank = ranks_[p][l];
     for (const auto& piece : patch.pieces) {
       const Box<Dim> box = intersection(patch.overlaps[l], piece.nodes.own);
       if (box.empty()) continue;
-      sent_[p].push_back({piece.body, box, owner_[link.patch]});
+      Message& message = messages_.outgoing(rank);
+      sent_[p].push_back({piece.body, box, rank});
       const Box<Dim> theirs = box.shifted(negated<Dim>(link.shift));
       message.put(std::int64_t{link.patch});
       message.put(std::int64_t{link.mirror});
@@ -168,7 +177,7 @@ void NodeExchange<Dim>::parse(int rank) {
     part.rank = rank, part.at = at, part.nodes_before = nodes;
     nodes += part.box.size();
     for (const auto& q : in_.quantities) at += part.box.size() * q.used;
-    parts_[position_[patch]].push_back(part);
+    parts_of(patch).push_back(part);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "cairn/solver/body_states.hpp"
 
+#include <bit>
 #include <map>
 
 namespace cairn {
@@ -123,13 +124,13 @@ std::vector<BodyState> body_states(const Simulation<Dim>& simulation) {
     for (const auto& piece : patch.pieces) {
       if (piece.points.size() == 0) continue;
       const Moments sums = moments_of(simulation, piece);
-      records.push_back(piece.body), records.push_back(patch.id);
+      records.push_back(piece.body), records.push_back(std::bit_cast<double>(patch.id));
       records.insert(records.end(), sums.m.begin(), sums.m.end());
     }
   const auto incoming = send_home(records, width, shares, simulation.communicator());
-  std::map<std::pair<int, int>, const double*> ordered;
+  std::map<std::pair<int, PatchId>, const double*> ordered;
   for (std::size_t i = 0; i < incoming.size(); i += width)
-    ordered[{static_cast<int>(incoming[i]), static_cast<int>(incoming[i + 1])}] = &incoming[i + 2];
+    ordered[{static_cast<int>(incoming[i]), std::bit_cast<PatchId>(incoming[i + 1])}] = &incoming[i + 2];
   std::map<int, std::array<double, Moments::size>> sums;
   for (const auto& [key, values] : ordered) {
     auto& sum = sums[key.first];
@@ -157,17 +158,17 @@ std::vector<ContactState> contact_states(const Simulation<Dim>& simulation, doub
   std::vector<double> records;
   for (const auto& patch : simulation.patches())
     for (const auto& [pair, sum] : patch.contacts) {
-      records.insert(records.end(), {double(pair.first), double(pair.second), double(patch.id)});
+      records.insert(records.end(), {double(pair.first), double(pair.second), std::bit_cast<double>(patch.id)});
       records.insert(records.end(), sum.values.begin(), sum.values.end());
     }
   const auto incoming = send_home(records, width, shares_of(simulation), simulation.communicator());
-  std::map<std::array<int, 3>, const double*> ordered;
+  std::map<std::tuple<int, int, PatchId>, const double*> ordered;
   for (std::size_t i = 0; i < incoming.size(); i += width)
-    ordered[{static_cast<int>(incoming[i]), static_cast<int>(incoming[i + 1]), static_cast<int>(incoming[i + 2])}] =
-        &incoming[i + 3];
+    ordered[{static_cast<int>(incoming[i]), static_cast<int>(incoming[i + 1]),
+             std::bit_cast<PatchId>(incoming[i + 2])}] = &incoming[i + 3];
   std::map<std::pair<int, int>, ContactSum<Dim>> sums;
   for (const auto& [key, values] : ordered) {
-    auto& sum = sums[{key[0], key[1]}].values;
+    auto& sum = sums[{std::get<0>(key), std::get<1>(key)}].values;
     // A contact may lie across a periodic boundary: bring the parts together before their positions are averaged.
     for (int d = 0; d < Dim; ++d) {
       const int at = 1 + Dim + d;

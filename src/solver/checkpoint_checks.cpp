@@ -87,7 +87,7 @@ std::string problem_of(const char* name, const std::vector<std::int64_t>& counts
 }
 
 template <int Dim>
-std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, int patch) {
+std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, PatchId patch) {
   using C = PointColumns<Dim>;
   const Points<Dim>& points = piece.points;
   const auto wrong = [&](int p, const char* what) {
@@ -135,8 +135,8 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   return sum.value();
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                  \
-  template std::string problem_of(const Piece<Dim>&, const Lattice<Dim>&, int); \
+#define CAIRN_INSTANTIATE(Dim)                                                      \
+  template std::string problem_of(const Piece<Dim>&, const Lattice<Dim>&, PatchId); \
   template std::string problem_of(std::pair<int, int>, const ContactSum<Dim>&, std::size_t);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

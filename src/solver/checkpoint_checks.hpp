@@ -20,7 +20,7 @@ std::string problem_of(const char* name, const std::vector<std::int64_t>& counts
 
 /// The points of a piece: in their patch, finite, neither empty nor inverted, crossings of periodic boundaries only.
 template <int Dim>
-std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, int patch);
+std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, PatchId patch);
 
 /// Bodies a < b that exist, and sums that are finite.
 template <int Dim>

@@ -44,22 +44,48 @@ inline constexpr const char* numbers_checksum_name = "numbers_checksum";  // of 
 
 /// Rows of every patch in some table.
 using Counts = std::vector<std::int64_t>;
-struct Layout {
-  Counts points, pieces, contacts;
-};
 
-/// Rows of a table in patch order that belong to this rank's patches.
-template <int Dim>
-RowBlocks rows_of(const std::vector<Patch<Dim>>& patches, const Counts& counts) {
-  RowBlocks rows;
-  auto patch = patches.begin();
-  for (int id = 0; id < static_cast<int>(counts.size()); rows.total_rows += counts[id], ++id) {
-    if (patch == patches.end() || patch->id != id) continue;
-    if (counts[id] > 0) rows.blocks.push_back({rows.total_rows, counts[id]});
-    ++patch;
+/// The patches that a checkpoint holds: those of which something has to be remembered.
+struct Layout {
+  std::vector<PatchId> patches;     // ascending
+  Counts points, pieces, contacts;  // of each
+  std::vector<std::size_t> here;    // places in the list of those of this rank, ascending
+
+  Counts one_each() const { return Counts(patches.size(), 1); }
+  /// Rows of a table in patch order that belong to this rank's patches.
+  RowBlocks rows_of(const Counts& counts) const {
+    RowBlocks rows;
+    auto mine = here.begin();
+    for (std::size_t p = 0; p < counts.size(); rows.total_rows += counts[p], ++p) {
+      if (mine == here.end() || *mine != p) continue;
+      if (counts[p] > 0) rows.blocks.push_back({rows.total_rows, counts[p]});
+      ++mine;
+    }
+    return rows;
   }
-  return rows;
-}
+  /// Those of this rank's patches (ascending) that are in the list, in its order; `here` becomes their places.
+  template <class P>
+  std::vector<P*> find(std::vector<P>& all) {
+    return find_in<P>(all);
+  }
+  template <class P>
+  std::vector<const P*> find(const std::vector<P>& all) {
+    return find_in<const P>(all);
+  }
+
+ private:
+  template <class P, class List>
+  std::vector<P*> find_in(List& all) {
+    std::vector<P*> found;
+    here.clear();
+    auto patch = all.begin();
+    for (std::size_t p = 0; p < patches.size(); ++p) {
+      while (patch != all.end() && patch->id < patches[p]) ++patch;
+      if (patch != all.end() && patch->id == patches[p]) found.push_back(&*patch), here.push_back(p);
+    }
+    return found;
+  }
+};
 
 /// Calls f(piece) for every piece of the patch with points: what a checkpoint holds.
 template <int Dim, class F>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <functional>
 #include <limits>
 #include <sstream>
 #include <type_traits>
@@ -17,22 +18,25 @@ namespace {
 
 using namespace checkpoint;
 
+/// This rank's patches that the checkpoint holds.
+template <int Dim>
+using PatchList = std::vector<Patch<Dim>*>;
+
 /// Reads columns in the order in which they were written and compares each patch's part with its checksum. What is
 /// wrong on this rank is kept until `settle`, so that all ranks stay together.
 template <int Dim>
 class ColumnReader {
  public:
-  ColumnReader(const CheckpointReader& reader, const std::vector<Patch<Dim>>& patches, std::size_t patch_count,
-               int columns)
-      : reader_(reader), patches_(patches), one_each_(patch_count, 1), columns_(columns) {
-    const RowBlocks rows = rows_of(patches_, one_each_);
+  ColumnReader(const CheckpointReader& reader, const PatchList<Dim>& patches, const Layout& layout, int columns)
+      : reader_(reader), patches_(patches), layout_(layout), one_each_(layout.one_each()), columns_(columns) {
+    const RowBlocks rows = layout_.rows_of(one_each_);
     sums_.resize(patches_.size() * static_cast<std::size_t>(columns_));
     reader_.table().read(checksums_name, columns_, rows, std::span(sums_));
   }
 
   template <class T>
   std::vector<T> read(const std::string& name, int components, const Counts& counts) {
-    const RowBlocks rows = rows_of(patches_, counts);
+    const RowBlocks rows = layout_.rows_of(counts);
     reader_.require(reader_.rows_of(name) == rows.total_rows
                         ? ""
                         : fmt::format("its column {} does not have the {} rows of its patches", name, rows.total_rows));
@@ -40,10 +44,11 @@ class ColumnReader {
     reader_.table().read(name, components, rows, std::span(values));
     std::size_t at = 0;
     for (std::size_t p = 0; p < patches_.size(); ++p) {
-      const auto size = static_cast<std::size_t>(counts[patches_[p].id] * components);
+      const auto size = static_cast<std::size_t>(counts[layout_.here[p]] * components);
       const std::uint64_t sum = checksum(std::span<const T>(values).subspan(at, size));
       if (std::bit_cast<std::int64_t>(sum) != sums_[p * columns_ + column_])
-        require(false, fmt::format("damaged: column {} of patch {} does not match its checksum", name, patches_[p].id));
+        require(false,
+                fmt::format("damaged: column {} of patch {} does not match its checksum", name, patches_[p]->id));
       at += size;
     }
     ++column_;
@@ -62,7 +67,8 @@ class ColumnReader {
 
  private:
   const CheckpointReader& reader_;
-  const std::vector<Patch<Dim>>& patches_;
+  const PatchList<Dim>& patches_;
+  const Layout& layout_;
   Counts one_each_;
   int columns_, column_ = 0;
   std::vector<std::int64_t> sums_;
@@ -70,37 +76,39 @@ class ColumnReader {
 };
 
 template <int Dim>
-void read_ledgers(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches) {
+void read_ledgers(ColumnReader<Dim>& in, const PatchList<Dim>& patches) {
   // The counts are known, and shown here to be what was written.
-  for (const char* name : {"patch_points", "patch_pieces", "patch_contacts"})
+  for (const char* name : {"patch_id", "patch_points", "patch_pieces", "patch_contacts"})
     in.template read_patches<std::int64_t>(name);
   for (const auto& column : ledger_columns) {
     const auto values = in.template read_patches<double>(column.name);
-    for (std::size_t p = 0; p < patches.size(); ++p) patches[p].ledger.*column.value = values[p];
+    for (std::size_t p = 0; p < patches.size(); ++p) patches[p]->ledger.*column.value = values[p];
   }
   in.settle();
 }
 
 /// Makes the pieces with room for their points.
 template <int Dim>
-void read_pieces(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout,
+void read_pieces(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout,
                  const std::vector<Body>& bodies, const std::vector<SolverMaterial>& materials) {
   const auto body = in.template read<std::int32_t>("piece_body", 1, layout.pieces);
   const auto count = in.template read<std::int64_t>("piece_points", 1, layout.pieces);
   const auto states = in.template read<std::int32_t>("piece_states", 1, layout.pieces);
   in.settle();
   std::size_t row = 0;
-  for (auto& patch : patches) {
+  for (std::size_t at = 0; at < patches.size(); ++at) {
+    Patch<Dim>& patch = *patches[at];
+    const std::size_t place = layout.here[at];
     std::int64_t points = 0;
-    for (std::int64_t i = 0; i < layout.pieces[patch.id]; ++i, ++row) {
+    for (std::int64_t i = 0; i < layout.pieces[place]; ++i, ++row) {
       const bool known = body[row] >= 0 && body[row] < std::ssize(bodies);
       in.require(known, fmt::format("it holds a body {}; the case has {} bodies", body[row], bodies.size()));
       const bool ascending = patch.pieces.empty() || patch.pieces.back().body < body[row];
       in.require(ascending, fmt::format("the bodies of patch {} are not in their order", patch.id));
-      const bool fits = count[row] > 0 && count[row] <= layout.points[patch.id] - points &&
+      const bool fits = count[row] > 0 && count[row] <= layout.points[place] - points &&
                         count[row] <= std::numeric_limits<int>::max();
       in.require(fits, fmt::format("body {} in patch {} has {} points; {} are left there", body[row], patch.id,
-                                   count[row], layout.points[patch.id] - points));
+                                   count[row], layout.points[place] - points));
       if (!known || !ascending || !fits) continue;
       const auto& material = materials[bodies[body[row]].material];
       in.require(states[row] == std::ssize(material.state_names),
@@ -110,22 +118,21 @@ void read_pieces(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
       patch.pieces.back().points.resize(static_cast<int>(count[row]));
       points += count[row];
     }
-    in.require(points == layout.points[patch.id],
-               fmt::format("the pieces of patch {} do not hold its points", patch.id));
+    in.require(points == layout.points[place], fmt::format("the pieces of patch {} do not hold its points", patch.id));
   }
   in.settle();
 }
 
 template <int Dim>
-void read_contacts(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout,
-                   std::size_t body_count) {
+void read_contacts(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout, std::size_t body_count) {
   constexpr std::size_t size = ContactSum<Dim>::size;
   const auto pairs = in.template read<std::int32_t>("contact_bodies", 2, layout.contacts);
   const auto sums = in.template read<double>("contact_sums", size, layout.contacts);
   in.settle();
   std::size_t row = 0;
-  for (auto& patch : patches)
-    for (std::int64_t i = 0; i < layout.contacts[patch.id]; ++i, ++row) {
+  for (std::size_t at = 0; at < patches.size(); ++at) {
+    Patch<Dim>& patch = *patches[at];
+    for (std::int64_t i = 0; i < layout.contacts[layout.here[at]]; ++i, ++row) {
       const std::pair<int, int> pair(pairs[2 * row], pairs[2 * row + 1]);
       in.require(patch.contacts.empty() || patch.contacts.rbegin()->first < pair,
                  fmt::format("the contacts of patch {} are not in their order", patch.id));
@@ -135,17 +142,18 @@ void read_contacts(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, cons
       in.require(problem.empty(), problem);
       patch.contacts[pair] = sum;
     }
+  }
   in.settle();
 }
 
 template <int Dim>
-void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const Layout& layout, int states) {
+void read_points(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout, int states) {
   {
     const auto ids = in.template read<std::int64_t>("id", 1, layout.points);
     const auto images = in.template read<std::int32_t>("image", image_components, layout.points);
     std::size_t row = 0;
-    for (auto& patch : patches)
-      for (auto& piece : patch.pieces)
+    for (auto* patch : patches)
+      for (auto& piece : patch->pieces)
         for (int p = 0; p < piece.points.size(); ++p, ++row) {
           piece.points.ids()[p] = ids[row];
           Image image{};
@@ -156,8 +164,8 @@ void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
   for (const Quantity& q : quantities<Dim>(states)) {
     const auto values = in.template read<double>(q.name, q.components, layout.points);
     const double* from = values.data();
-    for (auto& patch : patches)
-      for (auto& piece : patch.pieces) {
+    for (auto* patch : patches)
+      for (auto& piece : patch->pieces) {
         Points<Dim>& points = piece.points;
         const int components = std::min(q.components, points.columns() - q.first);
         for (int c = 0; c < components; ++c)
@@ -171,11 +179,11 @@ void read_points(ColumnReader<Dim>& in, std::vector<Patch<Dim>>& patches, const 
 
 /// Each point is there once, and where it can be.
 template <int Dim>
-void check_points(ColumnReader<Dim>& in, const std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice) {
+void check_points(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lattice<Dim>& lattice) {
   std::vector<std::int64_t> ids;
-  for (const auto& patch : patches)
-    for (const auto& piece : patch.pieces) {
-      const std::string problem = problem_of(piece, lattice, patch.id);
+  for (const auto* patch : patches)
+    for (const auto& piece : patch->pieces) {
+      const std::string problem = problem_of(piece, lattice, patch->id);
       in.require(problem.empty(), problem);
       ids.insert(ids.end(), piece.points.ids().begin(), piece.points.ids().end());
     }
@@ -223,11 +231,13 @@ Checkpoint::Checkpoint(const std::filesystem::path& file, MPI_Comm comm)
       comm_(comm),
       state_(read_state(reader_)),
       case_text_(reader_.text("case")),
+      patches_(reader_.column<std::int64_t>("patch_id")),
       points_(reader_.column<std::int64_t>("patch_points")),
       pieces_(reader_.column<std::int64_t>("patch_pieces")),
       contacts_(reader_.column<std::int64_t>("patch_contacts")) {
   check_numbers(reader_, state_, case_text_);
-  const bool consistent = points_.size() == pieces_.size() && points_.size() == contacts_.size();
+  const std::size_t patches = patches_.size();
+  const bool consistent = points_.size() == patches && pieces_.size() == patches && contacts_.size() == patches;
   reader_.require(consistent ? "" : "damaged: the tables of patches do not fit together");
   const std::int64_t rows = reader_.rows_of("id");
   reader_.require(rows == reader_.table().rows() ? "" : "damaged: it has more or fewer points than it says");
@@ -241,24 +251,31 @@ void Checkpoint::check_layout(const Lattice<Dim>& lattice) const {
   std::int64_t dimension = 0;
   reader_.read("dimension", dimension);
   reader_.require(dimension == Dim ? "" : fmt::format("it is of a case in {} dimensions, not {}", dimension, Dim));
-  reader_.require(std::ssize(points_) == lattice.patch_count()
-                      ? ""
-                      : fmt::format("it holds {} patches, the case has {}", points_.size(), lattice.patch_count()));
+  std::int64_t patches = 0;
+  reader_.read("patches", patches);
+  reader_.require(
+      patches == lattice.patch_count()
+          ? ""
+          : fmt::format("it divides the domain into {} patches, the case into {}", patches, lattice.patch_count()));
+  const bool ordered = std::ranges::adjacent_find(patches_, std::greater_equal{}) == patches_.end() &&
+                       (patches_.empty() || (patches_.front() >= 0 && patches_.back() < lattice.patch_count()));
+  reader_.require(ordered ? "" : "its patches are not in their order, or not those of the case");
 }
 
 template <int Dim>
 void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
                       const std::vector<SolverMaterial>& materials) const {
-  const Layout layout{points_, pieces_, contacts_};
+  Layout layout{patches_, points_, pieces_, contacts_, {}};
+  const PatchList<Dim> held = layout.find(patches);
   const int states = most_states(materials);
-  constexpr int columns_besides_quantities = 10 + static_cast<int>(std::size(ledger_columns));
+  constexpr int columns_besides_quantities = 11 + static_cast<int>(std::size(ledger_columns));
   const int columns = columns_besides_quantities + static_cast<int>(quantities<Dim>(states).size());
-  ColumnReader<Dim> in(reader_, patches, points_.size(), columns);
-  read_ledgers(in, patches);
-  read_pieces(in, patches, layout, bodies, materials);
-  read_contacts(in, patches, layout, bodies.size());
-  read_points(in, patches, layout, states);
-  check_points(in, patches, lattice);
+  ColumnReader<Dim> in(reader_, held, layout, columns);
+  read_ledgers(in, held);
+  read_pieces(in, held, layout, bodies, materials);
+  read_contacts(in, held, layout, bodies.size());
+  read_points(in, held, layout, states);
+  check_points(in, held, lattice);
 }
 
 template void Checkpoint::check_layout(const Lattice<2>&) const;

@@ -17,17 +17,17 @@ using namespace checkpoint;
 template <int Dim>
 class ColumnWriter {
  public:
-  ColumnWriter(CheckpointWriter& writer, const std::vector<Patch<Dim>>& patches, std::size_t patch_count)
-      : writer_(writer), patches_(patches), one_each_(patch_count, 1), sums_(patches.size()) {}
+  ColumnWriter(CheckpointWriter& writer, const std::vector<const Patch<Dim>*>& patches, const Layout& layout)
+      : writer_(writer), patches_(patches), layout_(layout), one_each_(layout.one_each()), sums_(patches.size()) {}
 
-  /// `counts`: rows of every patch; `values`: of this rank's patches.
+  /// `counts`: rows of every patch of the layout; `values`: of this rank's patches.
   template <class T>
   void write(const std::string& name, int components, const Counts& counts, const std::vector<T>& values) {
     const std::span<const T> all(values);
-    writer_.write({name, components, all}, rows_of(patches_, counts));
+    writer_.write({name, components, all}, layout_.rows_of(counts));
     std::size_t at = 0;
-    for (std::size_t p = 0; p < patches_.size(); ++p) {
-      const auto size = static_cast<std::size_t>(counts[patches_[p].id] * components);
+    for (std::size_t p = 0; p < sums_.size(); ++p) {
+      const auto size = static_cast<std::size_t>(counts[layout_.here[p]] * components);
       sums_[p].push_back(std::bit_cast<std::int64_t>(checksum(all.subspan(at, size))));
       at += size;
     }
@@ -38,59 +38,76 @@ class ColumnWriter {
   template <class T, class F>
   void write_patches(const std::string& name, F&& value_of) {
     std::vector<T> values;
-    for (const auto& patch : patches_) values.push_back(value_of(patch));
+    for (const auto* patch : patches_) values.push_back(value_of(*patch));
     write(name, 1, one_each_, values);
   }
 
   void write_checksums() {
     std::vector<std::int64_t> all;
     for (const auto& sums : sums_) all.insert(all.end(), sums.begin(), sums.end());
-    writer_.write({checksums_name, columns_, std::span<const std::int64_t>(all)}, rows_of(patches_, one_each_));
+    writer_.write({checksums_name, columns_, std::span<const std::int64_t>(all)}, layout_.rows_of(one_each_));
   }
 
  private:
   CheckpointWriter& writer_;
-  const std::vector<Patch<Dim>>& patches_;
+  const std::vector<const Patch<Dim>*>& patches_;
+  const Layout& layout_;
   Counts one_each_;                              // rows of tables with one row for each patch
   std::vector<std::vector<std::int64_t>> sums_;  // for each patch, of each column
   int columns_ = 0;
 };
 
-/// Points, pieces with points and contacts of every patch. Collective.
+/// Patches that are not blank, with their points, pieces with points and contacts. Collective.
 template <int Dim>
 Layout layout_of(const Simulation<Dim>& simulation) {
-  const auto patches = static_cast<std::size_t>(simulation.lattice().patch_count());
-  Layout layout{Counts(patches, 0), Counts(patches, 0), Counts(patches, 0)};
+  const PatchTable<Dim>& table = simulation.table();
+  enum { present, points, pieces, contacts, numbers };
+  Counts counts(table.size() * numbers, 0);
   for (const auto& patch : simulation.patches()) {
-    for_filled(patch, [&](const Piece<Dim>& piece) {
-      layout.points[patch.id] += piece.points.size(), ++layout.pieces[patch.id];
-    });
-    layout.contacts[patch.id] = std::ssize(patch.contacts);
+    if (patch.blank()) continue;
+    std::int64_t* count = &counts[table.find(patch.id) * numbers];
+    count[present] = 1, count[contacts] = std::ssize(patch.contacts);
+    for_filled(patch, [&](const Piece<Dim>& piece) { count[points] += piece.points.size(), ++count[pieces]; });
   }
-  for (Counts* counts : {&layout.points, &layout.pieces, &layout.contacts})
-    MPI_Allreduce(MPI_IN_PLACE, counts->data(), static_cast<int>(patches), MPI_INT64_T, MPI_SUM,
-                  simulation.communicator());
+  MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM,
+                simulation.communicator());
+  Layout layout;
+  for (std::size_t p = 0; p < table.size(); ++p) {
+    const std::int64_t* count = &counts[p * numbers];
+    if (!count[present]) continue;
+    layout.patches.push_back(table.patches()[p]);
+    layout.points.push_back(count[points]), layout.pieces.push_back(count[pieces]);
+    layout.contacts.push_back(count[contacts]);
+  }
   return layout;
 }
 
 template <int Dim>
-void write_patches(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patches, const Layout& layout) {
+using PatchList = std::vector<const Patch<Dim>*>;
+
+template <int Dim>
+void write_patches(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const Layout& layout) {
   using P = Patch<Dim>;
-  out.template write_patches<std::int64_t>("patch_points", [&](const P& p) { return layout.points[p.id]; });
-  out.template write_patches<std::int64_t>("patch_pieces", [&](const P& p) { return layout.pieces[p.id]; });
-  out.template write_patches<std::int64_t>("patch_contacts", [&](const P& p) { return layout.contacts[p.id]; });
+  out.template write_patches<std::int64_t>("patch_id", [](const P& p) { return p.id; });
+  const auto write_counts = [&](const char* name, const Counts& counts) {
+    std::vector<std::int64_t> mine;
+    for (const std::size_t place : layout.here) mine.push_back(counts[place]);
+    out.write(name, 1, layout.one_each(), mine);
+  };
+  write_counts("patch_points", layout.points), write_counts("patch_pieces", layout.pieces);
+  write_counts("patch_contacts", layout.contacts);
   for (const auto& column : ledger_columns)
     out.template write_patches<double>(column.name, [&](const P& p) { return p.ledger.*column.value; });
 
   std::vector<std::int32_t> body, states, pairs;
   std::vector<std::int64_t> count;
   std::vector<double> sums;
-  for (const P& patch : patches) {
-    for_filled(patch, [&](const Piece<Dim>& piece) {
+  for (const P* patch : patches) {
+    for_filled(*patch, [&](const Piece<Dim>& piece) {
       body.push_back(piece.body), count.push_back(piece.points.size());
       states.push_back(piece.points.columns() - PointColumns<Dim>::state);
     });
-    for (const auto& [pair, sum] : patch.contacts) {
+    for (const auto& [pair, sum] : patch->contacts) {
       pairs.push_back(pair.first), pairs.push_back(pair.second);
       sums.insert(sums.end(), sum.values.begin(), sum.values.end());
     }
@@ -104,11 +121,11 @@ void write_patches(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patche
 
 /// One quantity at a time, so that little memory is needed beside the points.
 template <int Dim>
-void write_points(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patches, const Layout& layout, int states) {
+void write_points(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const Layout& layout, int states) {
   std::vector<std::int64_t> ids;
   std::vector<std::int32_t> images;
-  for (const auto& patch : patches)
-    for_filled(patch, [&](const Piece<Dim>& piece) {
+  for (const auto* patch : patches)
+    for_filled(*patch, [&](const Piece<Dim>& piece) {
       ids.insert(ids.end(), piece.points.ids().begin(), piece.points.ids().end());
       for (const Image& image : piece.points.images())
         images.insert(images.end(), image.begin(), image.begin() + image_components);
@@ -118,8 +135,8 @@ void write_points(ColumnWriter<Dim>& out, const std::vector<Patch<Dim>>& patches
   for (const Quantity& q : quantities<Dim>(states)) {
     std::vector<double> values(ids.size() * static_cast<std::size_t>(q.components), 0.0);
     double* to = values.data();
-    for (const auto& patch : patches)
-      for_filled(patch, [&](const Piece<Dim>& piece) {
+    for (const auto* patch : patches)
+      for_filled(*patch, [&](const Piece<Dim>& piece) {
         const Points<Dim>& points = piece.points;
         const int components = std::min(q.components, points.columns() - q.first);
         for (int c = 0; c < components; ++c)
@@ -166,17 +183,18 @@ template <int Dim>
 void write_checkpoint(const std::filesystem::path& file, const Simulation<Dim>& simulation, const RunState& state,
                       const std::string& case_text) {
   const MPI_Comm comm = simulation.communicator();
-  const auto& patches = simulation.patches();
-  const Layout layout = layout_of(simulation);
+  Layout layout = layout_of(simulation);
+  const PatchList<Dim> patches = layout.find(simulation.patches());
   const int states = most_states(simulation.materials());
   const std::int64_t bytes = bytes_of<Dim>(layout, states, case_text.size() + 64 * state.series.size());
   const std::int64_t points = std::accumulate(layout.points.begin(), layout.points.end(), std::int64_t{0});
   CheckpointWriter writer(file, comm, bytes, points, state.step.time, state.step.steps);
   writer.add("dimension", std::int64_t{Dim});
+  writer.add("patches", simulation.lattice().patch_count());
   write_state(writer, state, comm);
   writer.add_text("case", case_text);
   writer.add(numbers_checksum_name, std::bit_cast<std::int64_t>(checksum_of(state, case_text)));
-  ColumnWriter<Dim> out(writer, patches, layout.points.size());
+  ColumnWriter<Dim> out(writer, patches, layout);
   write_patches(out, patches, layout);
   write_points(out, patches, layout, states);
   out.write_checksums();

@@ -22,13 +22,6 @@ std::string shortage(double needed, double available, const std::string& who, co
 
 }  // namespace
 
-std::int64_t points_of_rank(const std::vector<std::int64_t>& points, const std::vector<int>& owner, int rank) {
-  std::int64_t sum = 0;
-  for (std::size_t p = 0; p < points.size(); ++p)
-    if (owner[p] == rank) sum += points[p];
-  return sum;
-}
-
 template <int Dim>
 double estimated_memory(std::int64_t points, const SolverOptions& solver, bool extras) {
   constexpr double point = 8.0 * PointColumns<Dim>::state + sizeof(std::int64_t) + sizeof(Image);

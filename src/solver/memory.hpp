@@ -9,9 +9,6 @@
 
 namespace cairn {
 
-/// Points in the patches of one rank.
-std::int64_t points_of_rank(const std::vector<std::int64_t>& points, const std::vector<int>& owner, int rank);
-
 /// Bytes that a rank with so many points will need at the least for points and nodes. `extras`: the release needs them.
 template <int Dim>
 double estimated_memory(std::int64_t points, const SolverOptions& solver, bool extras);

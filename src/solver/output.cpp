@@ -43,15 +43,16 @@ class Columns {
 /// Rows of the points of this rank's patches: in the file they lie in patch order. Collective.
 template <int Dim>
 RowBlocks point_rows(const Simulation<Dim>& simulation) {
-  std::vector<std::int64_t> counts(simulation.lattice().patch_count(), 0);
-  for (const auto& patch : simulation.patches()) counts[patch.id] = patch.point_count();
+  const PatchTable<Dim>& table = simulation.table();
+  std::vector<std::int64_t> counts(table.size(), 0);
+  for (const auto& patch : simulation.patches()) counts[table.find(patch.id)] = patch.point_count();
   MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM,
                 simulation.communicator());
   RowBlocks rows;
   auto patch = simulation.patches().begin();
-  for (int id = 0; id < simulation.lattice().patch_count(); rows.total_rows += counts[id], ++id)
-    if (patch != simulation.patches().end() && patch->id == id) {
-      if (counts[id] > 0) rows.blocks.push_back({rows.total_rows, counts[id]});
+  for (std::size_t i = 0; i < counts.size(); rows.total_rows += counts[i], ++i)
+    if (patch != simulation.patches().end() && patch->id == table.patches()[i]) {
+      if (counts[i] > 0) rows.blocks.push_back({rows.total_rows, counts[i]});
       ++patch;
     }
   return rows;

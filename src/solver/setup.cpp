@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -99,18 +100,24 @@ class Filler {
         lattice_(lattice),
         bodies_(bodies),
         materials_(materials),
-        per_direction_(static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / Dim)))),
-        bodies_of_(lattice.patch_count()) {
+        per_direction_(static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / Dim)))) {
     constexpr double direction[] = {1.0, 0.7549, 0.5698};  // along no face that goes through rows of points
     for (int d = 0; d < Dim; ++d) aside_[d] = 1e-7 * direction[d] * lattice.spacing()[d];
     for (int b = 0; b < static_cast<int>(c.bodies.size()); ++b) list_images(b);
   }
 
+  /// Patches that the bounds of bodies reach, ascending.
+  std::vector<PatchId> patches() const {
+    std::vector<PatchId> all;
+    for (const auto& [patch, bodies] : bodies_of_) all.push_back(patch);
+    return all;
+  }
+
   /// Calls f(body, position, share of a whole point's volume, image shift) for every point of the patch: by body, then
   /// by cell, then within the cell.
   template <class F>
-  void for_points(int patch, F&& f) const {
-    for (const auto& placed : bodies_of_[patch]) {
+  void for_points(PatchId patch, F&& f) const {
+    for (const auto& placed : bodies_of_.at(patch)) {
       const Shape& shape = case_.bodies[placed.body].shape;
       const Box<Dim> cells = intersection(placed.cells, lattice_.patch_cells(patch));
       Box<Dim> inside;
@@ -225,7 +232,7 @@ class Filler {
   const std::vector<Body>& bodies_;
   const std::vector<SolverMaterial>& materials_;
   int per_direction_;
-  std::vector<std::vector<Placed>> bodies_of_;  // for each patch, ascending in body
+  std::map<PatchId, std::vector<Placed>> bodies_of_;  // ascending in body
 };
 
 /// \throws InputError on every rank where a body got no point at all
@@ -284,19 +291,29 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
 }
 
 template <int Dim>
-void Simulation<Dim>::make_patches(const std::vector<std::int64_t>& points) {
+void Simulation<Dim>::make_patches(const std::vector<PatchId>& filled, const std::vector<std::int64_t>& points,
+                                   const std::vector<PatchId>& kept) {
   total_points_ = std::accumulate(points.begin(), points.end(), std::int64_t{0});
-  owner_ = distribute_patches(lattice_, points, ranks_, parallel_.partition);
-  const std::int64_t mine = points_of_rank(points, owner_, rank_);
+  table_ = PatchTable<Dim>(lattice_, filled, kept);
+  std::vector<std::int64_t> work(table_.size(), 0);
+  for (std::size_t p = 0; p < filled.size(); ++p) work[table_.find(filled[p])] = points[p];
+  table_.assign(distribute_patches(lattice_, table_.patches(), work, ranks_, parallel_.partition));
+  std::int64_t mine = 0;
+  for (std::size_t p = 0; p < filled.size(); ++p)
+    if (table_.owner(filled[p]) == rank_) mine += points[p];
   require_memory(estimated_memory<Dim>(mine, solver_, transfer_.extras), comm_);
-  for (int patch = 0; patch < lattice_.patch_count(); ++patch)
-    if (owner_[patch] == rank_) patches_.emplace_back(patch, lattice_);
+  for (const PatchId patch : table_.patches())
+    if (table_.owner(patch) == rank_) patches_.emplace_back(patch, lattice_);
 }
 
 template <int Dim>
 void Simulation<Dim>::restore(const Checkpoint& from) {
   from.check_layout(lattice_);
-  make_patches(from.points());
+  std::vector<PatchId> filled;
+  std::vector<std::int64_t> points;
+  for (std::size_t p = 0; p < from.patches().size(); ++p)
+    if (from.points()[p] > 0) filled.push_back(from.patches()[p]), points.push_back(from.points()[p]);
+  make_patches(filled, points, from.patches());
   from.fill(patches_, lattice_, bodies_, materials_);
   connect_patches();
   const StepState& state = from.state().step;
@@ -309,17 +326,25 @@ template <int Dim>
 void Simulation<Dim>::place_points(const Case& c) {
   // Each rank counts the points of some patches; then every rank knows all counts and deals the patches out alike.
   const Filler<Dim> filler(c, lattice_, bodies_, materials_);
-  std::vector<std::int64_t> count(lattice_.patch_count(), 0), of_body(bodies_.size(), 0);
-  for (int patch = rank_; patch < lattice_.patch_count(); patch += ranks_)
-    filler.for_points(patch, [&](int body, const Vec3&, double, const Vec3&) { ++count[patch], ++of_body[body]; });
+  const std::vector<PatchId> reached = filler.patches();
+  std::vector<std::int64_t> count(reached.size(), 0), of_body(bodies_.size(), 0);
+  for (std::size_t p = rank_; p < reached.size(); p += ranks_)
+    filler.for_points(reached[p], [&](int body, const Vec3&, double, const Vec3&) { ++count[p], ++of_body[body]; });
   MPI_Allreduce(MPI_IN_PLACE, count.data(), static_cast<int>(count.size()), MPI_INT64_T, MPI_SUM, comm_);
   check_bodies(c, of_body, comm_);
-  make_patches(count);
+  std::vector<PatchId> filled;
+  std::vector<std::int64_t> points;
+  for (std::size_t p = 0; p < reached.size(); ++p)
+    if (count[p] > 0) filled.push_back(reached[p]), points.push_back(count[p]);
+  make_patches(filled, points, {});
 
   std::int64_t first_id = 0;
   auto patch = patches_.begin();
-  for (int id = 0; id < lattice_.patch_count(); first_id += count[id], ++id)
-    if (owner_[id] == rank_) filler.fill(*patch++, first_id);
+  for (std::size_t p = 0; p < filled.size(); first_id += points[p], ++p) {
+    if (table_.owner(filled[p]) != rank_) continue;
+    while (patch->id != filled[p]) ++patch;
+    filler.fill(*patch, first_id);
+  }
   connect_patches();
 
   using C = PointColumns<Dim>;

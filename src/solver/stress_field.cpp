@@ -4,6 +4,7 @@ namespace cairn {
 
 template <int Dim>
 void Simulation<Dim>::project_stress() {
+  finish_speed_reduction();  // patches that points entered have their neighbours then
   exchange_->begin_with_boxes({{&NodeBox<Dim>::sums, NodeStress<Dim>::width, NodeStress<Dim>::used}});
   exchange_after([&](std::size_t, Patch<Dim>& patch) {
     for (auto& piece : patch.pieces) {

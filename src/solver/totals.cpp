@@ -1,3 +1,4 @@
+#include <bit>
 #include <map>
 
 #include "cairn/solver/simulation.hpp"
@@ -42,15 +43,16 @@ Totals Simulation<Dim>::totals() const {
   // Partial sums of every patch go to rank 0, which adds them in patch order.
   std::vector<double> mine;
   for (const auto& patch : patches_) {
+    if (patch.blank()) continue;
     Sums sums{};
     for (const auto& piece : patch.pieces) add_piece(*this, piece, sums);
     for (int i = 0; i < ledger_sums; ++i) sums[point_sums + i] = patch.ledger.*ledger_columns[i].value;
-    mine.push_back(patch.id);
+    mine.push_back(std::bit_cast<double>(patch.id));
     mine.insert(mine.end(), sums.begin(), sums.end());
   }
   const std::vector<double> all = gather_on_first(mine, comm_);
-  std::map<int, const double*> by_patch;
-  for (std::size_t i = 0; i < all.size(); i += 1 + sum_count) by_patch[static_cast<int>(all[i])] = &all[i + 1];
+  std::map<PatchId, const double*> by_patch;
+  for (std::size_t i = 0; i < all.size(); i += 1 + sum_count) by_patch[std::bit_cast<PatchId>(all[i])] = &all[i + 1];
   Sums sums{};
   for (const auto& [patch, values] : by_patch)
     for (int i = 0; i < sum_count; ++i) sums[i] += values[i];

@@ -210,6 +210,7 @@ std::uint64_t digest_of(const Simulation<Dim>& simulation, const RunState& state
   for (const auto& entry : state.series) add(entry.name, entry.time);
   sum.add_values(std::span(case_text.data(), case_text.size()));
   for (const auto& patch : simulation.patches()) {
+    if (patch.blank()) continue;  // of those, others may be there after a restart
     const PatchLedger& ledger = patch.ledger;
     add("ledger", std::array{ledger.contact_dissipation, ledger.boundary_work, ledger.blended_and_spun,
                              static_cast<double>(ledger.contact_nodes)});
@@ -217,7 +218,7 @@ std::uint64_t digest_of(const Simulation<Dim>& simulation, const RunState& state
       add("contact", pair.first), add("and", pair.second), add("", contact.values);
     for (const auto& piece : patch.pieces) {
       if (piece.points.size() == 0) continue;
-      add("piece", std::array{patch.id, piece.body, piece.points.size()});
+      add("piece", std::array{static_cast<int>(patch.id), piece.body, piece.points.size()});
       const auto size = static_cast<std::size_t>(piece.points.size());
       for (int c = 0; c < piece.points.columns(); ++c) sum.add_values(std::span(piece.points.column(c), size));
       sum.add_values(std::span(piece.points.ids()));

@@ -27,7 +27,7 @@ void for_lattices(F&& check) {
 
 template <int Dim>
 void check_tiling(const Lattice<Dim>& lattice) {
-  std::map<Index<Dim>, int> holder;
+  std::map<Index<Dim>, PatchId> holder;
   for (int p = 0; p < lattice.patch_count(); ++p) {
     EXPECT_EQ(lattice.patch_at(lattice.patch_position(p)), p);
     const auto cells = lattice.patch_cells(p);
@@ -87,7 +87,7 @@ void check_links(const Lattice<Dim>& lattice) {
   for (int d = 0; d < Dim; ++d) images.lower[d] = lattice.periodic(d) ? -2 : 0, images.upper[d] = -images.lower[d] + 1;
   for (int p = 0; p < lattice.patch_count(); ++p) {
     const auto links = lattice.links(p);
-    std::set<std::pair<int, Index<Dim>>> found, expected;
+    std::set<std::pair<PatchId, Index<Dim>>> found, expected;
     for (std::size_t l = 0; l < links.size(); ++l) {
       EXPECT_TRUE(found.emplace(links[l].patch, links[l].shift).second) << "a link twice";
       const auto back = lattice.links(links[l].patch).at(links[l].mirror);
@@ -119,7 +119,7 @@ TEST(Lattice, OnePatchInAPeriodicDirectionIsItsOwnNeighbour) {
 }
 
 template <int Dim>
-using Contribution = std::pair<int, Index<Dim>>;  // patch, position of the node in that patch's frame
+using Contribution = std::pair<PatchId, Index<Dim>>;  // patch, position of the node in that patch's frame
 
 /// Who adds to a node, in the order in which a patch adds, as `Patch` prescribes it.
 template <int Dim>

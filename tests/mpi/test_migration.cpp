@@ -35,14 +35,15 @@ Vec<Dim> wrapped(const Lattice<Dim>& lattice, Vec<Dim> x) {
 /// Ids of every piece after migration by the documented rule: those that stay, then arrivals by (source patch, order
 /// there).
 template <int Dim>
-std::map<std::pair<int, int>, std::vector<std::int64_t>> expected_order(const World<Dim>& before,
-                                                                        const std::map<std::int64_t, Vec<Dim>>& to) {
-  std::map<std::pair<int, int>, std::vector<std::int64_t>> order;
+std::map<std::pair<PatchId, int>, std::vector<std::int64_t>> expected_order(
+    const World<Dim>& before, const std::map<std::int64_t, Vec<Dim>>& to) {
+  std::map<std::pair<PatchId, int>, std::vector<std::int64_t>> order;
   for (bool staying : {true, false})
     for (const auto& patch : before.patches)  // ascending
       for (const auto& piece : patch.pieces)
         for (std::int64_t id : piece.points.ids()) {
-          const int home = before.lattice.patch_of_cell(cell_of(before.lattice, wrapped(before.lattice, to.at(id))));
+          const PatchId home =
+              before.lattice.patch_of_cell(cell_of(before.lattice, wrapped(before.lattice, to.at(id))));
           if ((home == patch.id) == staying) order[{home, piece.body}].push_back(id);
         }
   return order;
@@ -116,7 +117,7 @@ std::string failure_of(const Lattice<2>& lattice, const Vec<2>& x, std::int64_t*
   MPI_Allreduce(MPI_IN_PLACE, points_left, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
   char text[512] = {};
   world.migration->failure().copy(text, sizeof(text) - 1);
-  MPI_Bcast(text, sizeof(text), MPI_CHAR, world.owner[0], MPI_COMM_WORLD);
+  MPI_Bcast(text, sizeof(text), MPI_CHAR, world.table.owner(0), MPI_COMM_WORLD);
   return text;
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <set>
 
@@ -14,6 +16,13 @@ namespace {
 
 using namespace test;
 
+/// All patches of a lattice dealt out.
+template <int Dim>
+std::vector<int> distribute(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& work, int ranks,
+                            Partition partition) {
+  return distribute_patches(lattice, all_patches(lattice), work, ranks, partition);
+}
+
 /// Work of each rank.
 std::vector<std::int64_t> loads(const std::vector<int>& owner, const std::vector<std::int64_t>& work, int ranks) {
   std::vector<std::int64_t> sum(ranks, 0);
@@ -25,12 +34,12 @@ template <int Dim>
 void check_metis(const Lattice<Dim>& lattice, const std::vector<std::int64_t>& work, double imbalance) {
   const double total = static_cast<double>(std::accumulate(work.begin(), work.end(), std::int64_t{0}));
   for (int ranks : {1, 2, 3, 4, 7, 8, 12}) {
-    const auto owner = distribute_patches(lattice, work, ranks, Partition::metis);
-    ASSERT_EQ(static_cast<int>(owner.size()), lattice.patch_count());
+    const auto owner = distribute(lattice, work, ranks, Partition::metis);
+    ASSERT_EQ(std::ssize(owner), lattice.patch_count());
     const auto sum = loads(owner, work, ranks);  // throws for a rank that does not exist
     EXPECT_LE(*std::max_element(sum.begin(), sum.end()), imbalance * total / ranks) << ranks << " ranks";
     EXPECT_GT(*std::min_element(sum.begin(), sum.end()), 0) << ranks << " ranks";
-    EXPECT_EQ(distribute_patches(lattice, work, ranks, Partition::metis), owner);
+    EXPECT_EQ(distribute(lattice, work, ranks, Partition::metis), owner);
   }
 }
 TEST(Distribution, MetisBalancesUniformWork) {
@@ -56,7 +65,7 @@ TEST(Distribution, MetisCutsLessThanDealingOut) {
   const auto lattice = lattice_of<2>({64, 64}, {false, false}, 4);
   const std::vector<std::int64_t> work(lattice.patch_count(), 64);
   const auto cut = [&](Partition partition) {
-    const auto owner = distribute_patches(lattice, work, 4, partition);
+    const auto owner = distribute(lattice, work, 4, partition);
     int links = 0;
     for (int p = 0; p < lattice.patch_count(); ++p)
       for (const auto& link : lattice.links(p)) links += owner[link.patch] != owner[p];
@@ -67,7 +76,7 @@ TEST(Distribution, MetisCutsLessThanDealingOut) {
 
 TEST(Distribution, RoundRobinDealsOutInTurn) {
   const auto lattice = lattice_of<2>({20, 12}, {true, false}, 4);
-  const auto owner = distribute_patches(lattice, std::vector<std::int64_t>(15, 1), 4, Partition::round_robin);
+  const auto owner = distribute(lattice, std::vector<std::int64_t>(15, 1), 4, Partition::round_robin);
   ASSERT_EQ(owner.size(), 15u);
   for (int p = 0; p < 15; ++p) EXPECT_EQ(owner[p], p % 4);
 }
@@ -76,7 +85,7 @@ TEST(Distribution, FewPatchesGoToOneRankEach) {
   const auto lattice = lattice_of<2>({8, 8}, {true, true}, 4);
   for (Partition partition : {Partition::metis, Partition::round_robin})
     for (int ranks : {4, 5, 9}) {
-      const auto owner = distribute_patches(lattice, std::vector<std::int64_t>(4, 10), ranks, partition);
+      const auto owner = distribute(lattice, std::vector<std::int64_t>(4, 10), ranks, partition);
       EXPECT_EQ(std::set<int>(owner.begin(), owner.end()).size(), 4u);
       for (int rank : owner) EXPECT_LT(rank, ranks);
     }
@@ -85,7 +94,51 @@ TEST(Distribution, FewPatchesGoToOneRankEach) {
 TEST(Distribution, OneRankHoldsAll) {
   const auto lattice = lattice_of<2>({20, 12}, {true, false}, 4);
   for (Partition partition : {Partition::metis, Partition::round_robin})
-    EXPECT_EQ(distribute_patches(lattice, std::vector<std::int64_t>(15, 1), 1, partition), std::vector<int>(15, 0));
+    EXPECT_EQ(distribute(lattice, std::vector<std::int64_t>(15, 1), 1, partition), std::vector<int>(15, 0));
+}
+
+/// A table of two far places in a domain of 10^12 cells and more.
+template <int Dim>
+void check_table(const Lattice<Dim>& lattice) {
+  Index<Dim> low{}, high = lattice.cells();
+  for (int d = 0; d < Dim; ++d) low[d] = 3, high[d] -= 9;
+  const std::vector<PatchId> filled = {lattice.patch_of_cell(low), lattice.patch_of_cell(high)};
+  PatchTable<Dim> table(lattice, filled);
+  EXPECT_LE(table.size(), 2 * std::pow(3, Dim));
+  EXPECT_TRUE(std::ranges::is_sorted(table.patches()));
+  for (const PatchId patch : filled) {
+    EXPECT_TRUE(table.is_filled(patch));
+    for (const auto& link : lattice.links(patch)) {
+      EXPECT_GE(table.find(link.patch), 0);
+      EXPECT_TRUE(!table.is_filled(link.patch) || std::ranges::find(filled, link.patch) != filled.end());
+    }
+  }
+  constexpr int ranks = 3;
+  const std::vector<std::int64_t> work(table.size(), 1);
+  const auto owners = distribute_patches(lattice, table.patches(), work, ranks, Partition::round_robin);
+  table.assign(owners);
+  EXPECT_EQ(table.owners(), owners);
+  // A point goes from patch to patch through the empty middle: the owner of each is known before and stays.
+  std::size_t added = 0;
+  for (int i = 1; i < 40; ++i) {
+    Index<Dim> cell = low;
+    for (int d = 0; d < Dim; ++d) cell[d] += i * 70;
+    const PatchId patch = lattice.patch_of_cell(cell);
+    const int owner = table.owner(patch);
+    EXPECT_TRUE(owner >= 0 && owner < ranks);
+    added += table.fill({patch, patch}).size();
+    EXPECT_TRUE(table.is_filled(patch));
+    EXPECT_EQ(table.owner(patch), owner);
+    EXPECT_TRUE(table.fill({patch}).empty());
+  }
+  EXPECT_EQ(table.size(), owners.size() + added);
+  const std::vector<int> before = table.owners();
+  table.assign(before);
+  EXPECT_EQ(table.owners(), before);
+}
+TEST(PatchTable, HoldsPatchesWithinReachAndKnowsWhoseTheOthersAre) {
+  check_table(lattice_of<2>({1'000'000, 1'000'000}, {false, true}, 64));
+  check_table(lattice_of<3>({1'000'000, 1'000'000, 1'000'000}, {true, false, false}, 4));
 }
 
 }  // namespace

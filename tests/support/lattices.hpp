@@ -2,6 +2,7 @@
 /// Lattices of several shapes for property tests: every choice of periodic directions, patches that do not divide the
 /// cells evenly, periodic directions one and two patches wide.
 
+#include <numeric>
 #include <type_traits>
 #include <vector>
 
@@ -32,6 +33,13 @@ std::vector<Lattice<Dim>> all_lattices() {
       lattices.push_back(lattice_of<Dim>(cells, periodic, 4));
     }
   return lattices;
+}
+
+template <int Dim>
+std::vector<PatchId> all_patches(const Lattice<Dim>& lattice) {
+  std::vector<PatchId> all(static_cast<std::size_t>(lattice.patch_count()));
+  std::iota(all.begin(), all.end(), PatchId{0});
+  return all;
 }
 
 /// The node inside one period that `node` is an image of.

@@ -60,7 +60,7 @@ std::vector<GlobalPoint<Dim>> make_points(const Lattice<Dim>& lattice, int count
 template <int Dim>
 struct World {
   const Lattice<Dim>& lattice;
-  std::vector<int> owner;
+  PatchTable<Dim> table;
   std::vector<Patch<Dim>> patches;
   std::unique_ptr<NeighbourExchange> messages;
   std::unique_ptr<NodeExchange<Dim>> exchange;
@@ -70,25 +70,27 @@ struct World {
   World(const Lattice<Dim>& lattice_, const std::vector<GlobalPoint<Dim>>& points, MPI_Comm comm) : lattice(lattice_) {
     int rank = 0, ranks = 1;
     MPI_Comm_rank(comm, &rank), MPI_Comm_size(comm, &ranks);
-    owner =
-        distribute_patches(lattice, std::vector<std::int64_t>(lattice.patch_count(), 1), ranks, Partition::round_robin);
+    const std::vector<PatchId> all = all_patches(lattice);
+    table = PatchTable<Dim>(lattice, all);
+    table.assign(
+        distribute_patches(lattice, all, std::vector<std::int64_t>(all.size(), 1), ranks, Partition::round_robin));
     std::set<int> neighbours;
-    for (int id = 0; id < lattice.patch_count(); ++id) {
-      if (owner[id] != rank) continue;
+    for (const PatchId id : all) {
+      if (table.owner(id) != rank) continue;
       patches.emplace_back(id, lattice);
-      for (const auto& link : patches.back().links) neighbours.insert(owner[link.patch]);
+      for (const auto& link : patches.back().links) neighbours.insert(table.owner(link.patch));
     }
     neighbours.erase(rank);
     for (const auto& point : points) add(point);
     messages = std::make_unique<NeighbourExchange>(comm, std::vector<int>(neighbours.begin(), neighbours.end()));
-    exchange = std::make_unique<NodeExchange<Dim>>(*messages, owner, patches);
-    migration = std::make_unique<Migration<Dim>>(*messages, owner);
+    exchange = std::make_unique<NodeExchange<Dim>>(*messages, table, patches);
+    migration = std::make_unique<Migration<Dim>>(*messages, table);
     ContactOptions contact;
     contact.release = Release::traction;
     settings = TransferSettings<Dim>::make(SolverOptions{}, contact, Vec<Dim>::Constant(-3));
     if constexpr (Dim == 3) settings.half_size.fill(0.25);
   }
-  Patch<Dim>* patch(int id) {
+  Patch<Dim>* patch(PatchId id) {
     for (auto& p : patches)
       if (p.id == id) return &p;
     return nullptr;
@@ -134,7 +136,7 @@ struct World {
     for (bool beside_others : {false, true}) {
       if (beside_others) exchange->receive();
       for (std::size_t p = 0; p < patches.size(); ++p)
-        if (exchange->beside_others(patches[p]) == beside_others) exchange->add(patches[p], p);
+        if (exchange->beside_others(p) == beside_others) exchange->add(patches[p], p);
     }
   }
 };

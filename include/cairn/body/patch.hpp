@@ -26,6 +26,7 @@ struct PatchLedger {
   double points_left = 0, points_lost = 0;
   double mass_left = 0, energy_left = 0;                                 // [kg], [J]
   double momentum_left_x = 0, momentum_left_y = 0, momentum_left_z = 0;  // [kg m/s]
+  friend bool operator==(const PatchLedger&, const PatchLedger&) = default;
 };
 
 /// One number of the ledger, under the name that it has in files. What moves or keeps a patch goes through this table.
@@ -58,7 +59,7 @@ struct ContactSum {
 
 template <int Dim>
 struct Patch {
-  int id;
+  PatchId id;
   Box<Dim> cells;                  // its own cells
   Box<Dim> nodes;                  // all nodes its points can touch
   std::vector<Link<Dim>> links;    // neighbours, in the order of sums
@@ -69,7 +70,7 @@ struct Patch {
   double seconds = 0;  // processor time spent on it since the last balance; steers nothing but balance
   std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
 
-  Patch(int id_, const Lattice<Dim>& lattice)
+  Patch(PatchId id_, const Lattice<Dim>& lattice)
       : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
     links = lattice.links(id);
     for (const auto& link : links) {
@@ -77,6 +78,9 @@ struct Patch {
       if (link.patch < id || (link.patch == id && link.shift > Index<Dim>{})) ++links_before;
     }
   }
+
+  /// Whether nothing has to be remembered of it: sums over all patches may leave it out.
+  bool blank() const { return point_count() == 0 && contacts.empty() && ledger == PatchLedger{}; }
 
   std::int64_t point_count() const {
     std::int64_t n = 0;

@@ -2,6 +2,7 @@
 /// The background lattice and its division into patches. A patch is a box of cells: the unit of distribution and of
 /// load balance. Patch size belongs to the case, never to the rank count.
 
+#include <cstdint>
 #include <vector>
 
 #include "cairn/core/types.hpp"
@@ -9,10 +10,14 @@
 
 namespace cairn {
 
+/// A patch by its place among all patches that the lattice has room for, x fastest: most of them may be empty, and only
+/// those within reach of points exist as a Patch.
+using PatchId = std::int64_t;
+
 /// A neighbour of a patch: one that shares nodes with it, directly or across a periodic boundary.
 template <int Dim>
 struct Link {
-  int patch;           // the neighbour
+  PatchId patch;       // the neighbour
   Index<Dim> shift{};  // node i of this patch is node i - shift of the neighbour (0 or +-cells in periodic directions)
   int mirror = -1;     // position in the neighbour's list of the link back
 };
@@ -42,35 +47,40 @@ class Lattice {
   /// face onto the last position inside; others stay. Returns the periods taken off: -1, 0 or 1.
   int wrap(int d, double& x) const;
 
-  int patch_count() const { return patch_count_; }
-  Index<Dim> patch_position(int patch) const;
-  int patch_at(const Index<Dim>& position) const;
-  Box<Dim> patch_cells(int patch) const;
+  PatchId patch_count() const { return patch_count_; }
+  Index<Dim> patch_position(PatchId patch) const;
+  PatchId patch_at(const Index<Dim>& position) const;
+  Box<Dim> patch_cells(PatchId patch) const;
   /// Nodes that points of the patch can touch with any shape function: one beyond its cells on every side, two at a
   /// face.
-  Box<Dim> patch_nodes(int patch) const;
+  Box<Dim> patch_nodes(PatchId patch) const;
   /// Where points may be, in cells from the lower corner along `d`: in the patch's cells, and half a cell beyond a face
   /// of the domain, since contact with a wall is as soft as the material.
-  std::array<double, 2> patch_reach(int patch, int d) const;
+  std::array<double, 2> patch_reach(PatchId patch, int d) const;
   /// The patch that holds a cell inside the lattice.
-  int patch_of_cell(const Index<Dim>& cell) const;
+  PatchId patch_of_cell(const Index<Dim>& cell) const;
   /// True where the patch answers for the node in sums over nodes: every node has one such patch.
-  bool owns_node(int patch, const Index<Dim>& node) const;
+  bool owns_node(PatchId patch, const Index<Dim>& node) const;
   /// Neighbours of a patch in ascending order of (patch, -shift): the order in which shared nodes are summed. A
   /// periodic direction with one patch makes a patch its own neighbour.
-  std::vector<Link<Dim>> links(int patch) const;
+  std::vector<Link<Dim>> links(PatchId patch) const;
+  /// The same without the links back.
+  std::vector<Link<Dim>> unpaired_links(PatchId patch) const;
 
  private:
-  std::vector<Link<Dim>> unpaired_links(int patch) const;
   double last_inside(int d) const;
 
   Vec<Dim> lower_, upper_, spacing_, inverse_;
   Vec<Dim> last_;  // the largest position that is inside [m]
   Index<Dim> cells_;
   std::array<bool, Dim> periodic_;
-  Index<Dim> patches_{};                    // patches in each direction
-  std::array<std::vector<int>, Dim> cuts_;  // first cell of each, and the end
-  int patch_count_ = 1;
+  /// First cell of the patches with this position along d.
+  int cut(int d, int position) const {
+    return static_cast<int>(static_cast<std::int64_t>(position) * cells_[d] / patches_[d]);
+  }
+
+  Index<Dim> patches_{};  // patches in each direction
+  PatchId patch_count_ = 1;
 };
 
 }  // namespace cairn

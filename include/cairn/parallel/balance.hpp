@@ -9,17 +9,19 @@
 
 namespace cairn {
 
-/// Largest over mean of the ranks' work, for patches with the given owners.
+// Work and owners are those of the patches of a table, in its order.
+
+/// Largest over mean of the ranks' work.
 double imbalance_of(const std::vector<std::int64_t>& work, const std::vector<int>& owner, int ranks);
 
 /// Renames the parts of a new partition so that as little work as possible changes rank.
 std::vector<int> keep_in_place(const std::vector<int>& parts, const std::vector<int>& owner,
                                const std::vector<std::int64_t>& work, int ranks);
 
-/// Sends every patch whose owner changes to its new rank, with its points, ledger and contacts. `patches` (ascending)
-/// and `owner` are replaced. Collective.
+/// Sends every patch whose owner changes to its new rank, with its points, ledger and contacts, and assigns the table
+/// anew. `patches` (ascending) are replaced. Collective.
 template <int Dim>
-void move_patches(std::vector<Patch<Dim>>& patches, std::vector<int>& owner, const std::vector<int>& new_owner,
+void move_patches(std::vector<Patch<Dim>>& patches, PatchTable<Dim>& table, const std::vector<int>& new_owner,
                   const Lattice<Dim>& lattice, MPI_Comm comm);
 
 }  // namespace cairn

@@ -62,6 +62,9 @@ class RollCall {
 /// The numbers of all ranks one after the other, in the order of the ranks, on rank 0; none elsewhere. Collective.
 std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm);
 
+/// The whole numbers of all ranks one after the other, in the order of the ranks. Collective.
+std::vector<std::int64_t> gather_on_all(std::span<const std::int64_t> mine, MPI_Comm comm);
+
 /// The largest of each of a few numbers over all ranks, found while other work is done.
 class MaximumReduction {
  public:

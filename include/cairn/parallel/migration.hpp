@@ -11,6 +11,7 @@
 
 #include "cairn/body/patch.hpp"
 #include "cairn/parallel/communicator.hpp"
+#include "cairn/parallel/distribution.hpp"
 
 namespace cairn {
 
@@ -36,9 +37,9 @@ inline bool is_lost(std::int64_t id) { return id < 0; }
 template <int Dim>
 class Migration {
  public:
-  /// \param owner  the rank of every patch; must outlive this object unchanged
-  Migration(NeighbourExchange& messages, const std::vector<int>& owner, Exits<Dim> exits = {})
-      : messages_(messages), owner_(owner), exits_(std::move(exits)) {}
+  /// \param table  of all patches; must outlive this object
+  Migration(NeighbourExchange& messages, const PatchTable<Dim>& table, Exits<Dim> exits = {})
+      : messages_(messages), table_(table), exits_(std::move(exits)) {}
 
   /// A migration: `begin`, `collect` for every piece, `start`, `finish`.
   void begin();
@@ -51,19 +52,22 @@ class Migration {
   void finish(std::vector<Patch<Dim>>& patches);
   /// What went wrong on this rank since `begin`; empty if nothing.
   const std::string& failure() const { return failure_; }
+  /// Patches that points of this rank entered since `begin` and that the table does not know as filled.
+  const std::vector<PatchId>& entered() const { return entered_; }
 
  private:
-  void send(const Patch<Dim>& patch, const Piece<Dim>& piece, std::vector<std::pair<int, int>>& leaving);
+  void send(const Patch<Dim>& patch, const Piece<Dim>& piece, std::vector<std::pair<PatchId, int>>& leaving);
 
   NeighbourExchange& messages_;
-  const std::vector<int>& owner_;
+  const PatchTable<Dim>& table_;
   Exits<Dim> exits_;
   std::string failure_;
+  std::vector<PatchId> entered_;
 };
 
 /// True where every point of the piece lies in its patch: what is found almost always, and fast.
 template <int Dim>
-bool all_inside(const Piece<Dim>& piece, const Lattice<Dim>& lattice, int patch);
+bool all_inside(const Piece<Dim>& piece, const Lattice<Dim>& lattice, PatchId patch);
 
 /// Sorts the points of a piece by cell, keeping the order within a cell. It is no longer `projected`.
 template <int Dim>

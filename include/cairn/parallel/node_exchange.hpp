@@ -11,6 +11,7 @@
 
 #include "cairn/body/patch.hpp"
 #include "cairn/parallel/communicator.hpp"
+#include "cairn/parallel/distribution.hpp"
 
 namespace cairn {
 
@@ -27,12 +28,14 @@ struct NodeQuantity {
 template <int Dim>
 class NodeExchange {
  public:
-  /// \param owner    the rank of every patch; must outlive this object unchanged
+  /// \param table    of all patches
   /// \param patches  of this rank; none may come or go
-  NodeExchange(NeighbourExchange& messages, const std::vector<int>& owner, const std::vector<Patch<Dim>>& patches);
+  NodeExchange(NeighbourExchange& messages, const PatchTable<Dim>& table, const std::vector<Patch<Dim>>& patches);
 
-  /// True where a neighbour of the patch lives on another rank.
-  bool beside_others(const Patch<Dim>& patch) const;
+  /// True where a neighbour of the p-th patch lives on another rank.
+  bool beside_others(std::size_t p) const;
+  /// True where the p-th patch got nothing in the last exchange.
+  bool is_quiet(std::size_t p) const { return parts_[p].empty(); }
 
   /// For the sums, forces (and extras) of shared nodes, with the boxes they cover: `add` makes node boxes grow to hold
   /// what arrives, and ghost pieces come and go.
@@ -66,16 +69,17 @@ class NodeExchange {
 
   void put_with_boxes(Patch<Dim>& patch, std::size_t p);
   void parse(int rank);
+  std::vector<Part>& parts_of(PatchId patch);
   void renew_ghosts(Patch<Dim>& patch, std::vector<Part>& parts) const;
   void add_to_piece(Piece<Dim>& piece, int links_before, std::span<const Part> parts) const;
   void add_part(NodeBox<Dim>& nodes, const Part& part) const;
 
   NeighbourExchange& messages_;
-  const std::vector<int>& owner_;
   Content out_, in_;                      // of what is put, and of what is added
   std::vector<std::vector<Sent>> sent_;   // for each patch, in the order of packing
   std::vector<std::vector<Part>> parts_;  // for each patch, ordered by (body, link)
-  std::vector<int> position_;             // of each local patch by id, else -1
+  std::vector<PatchId> ids_;              // of each patch, ascending
+  std::vector<std::vector<int>> ranks_;   // for each patch, of its links; -1 where there is no such patch
 };
 
 }  // namespace cairn

@@ -30,7 +30,8 @@ class Checkpoint {
   const std::filesystem::path& file() const { return reader_.file(); }
   const RunState& state() const { return state_; }
   const std::string& case_text() const { return case_text_; }
-  /// Points of every patch.
+  /// The patches that it holds, ascending, and the points of each, which may be none.
+  const std::vector<PatchId>& patches() const { return patches_; }
   const std::vector<std::int64_t>& points() const { return points_; }
 
   /// \throws InputError if the file is of another dimension or another division into patches
@@ -48,7 +49,8 @@ class Checkpoint {
   MPI_Comm comm_;
   RunState state_;
   std::string case_text_;
-  std::vector<std::int64_t> points_, pieces_, contacts_;  // of every patch
+  std::vector<PatchId> patches_;
+  std::vector<std::int64_t> points_, pieces_, contacts_;  // of each
 };
 
 }  // namespace cairn

@@ -8,6 +8,7 @@
 #include "cairn/boundary/faces.hpp"
 #include "cairn/contact/sweep.hpp"
 #include "cairn/io/case.hpp"
+#include "cairn/parallel/distribution.hpp"
 #include "cairn/parallel/migration.hpp"
 #include "cairn/parallel/node_exchange.hpp"
 #include "cairn/solver/timers.hpp"
@@ -92,7 +93,9 @@ class Simulation {
       for (auto& piece : patch.pieces) piece.projected = false;
     return patches_;
   }
-  const std::vector<int>& owner() const { return owner_; }
+  const PatchTable<Dim>& table() const { return table_; }
+  /// Patches that this rank computed so far, once for each stage between exchanges: empty ones are passed over.
+  std::int64_t patches_computed() const { return patches_computed_; }
   MPI_Comm communicator() const { return comm_; }
   const StageTimers& timers() const { return timers_; }
   StageTimers& timers() { return timers_; }
@@ -134,9 +137,13 @@ class Simulation {
 
   void place_points(const Case& c);
   void restore(const Checkpoint& from);
-  void make_patches(const std::vector<std::int64_t>& points);  // of every patch; those of this rank, without points
-  void connect_patches();                                      // after patches came or went
-  void balance();                                              // (*)
+  /// Makes the table of all patches, given those with points and others to keep, and this rank's patches, empty.
+  void make_patches(const std::vector<PatchId>& filled, const std::vector<std::int64_t>& points,
+                    const std::vector<PatchId>& kept);
+  void connect_patches();       // after patches came or went
+  void add_new_patches();       // communicates; around patches that points entered
+  void forget_blank_patches();  // (*); those far from points
+  void balance();               // (*)
 
   /// Computes every patch: first those among patches of this rank, while the messages of the exchange before travel.
   template <class F>
@@ -147,8 +154,14 @@ class Simulation {
         exchange_->receive();
       }
       for (std::size_t p = 0; p < patches_.size(); ++p)
-        if (beside_others_[p] == beside_others) compute(p, patches_[p]);
+        if (beside_others_[p] == beside_others && !is_idle(p)) ++patches_computed_, compute(p, patches_[p]);
     }
+  }
+  /// Nothing is or comes there: nothing to do.
+  bool is_idle(std::size_t p) {
+    if (!patches_[p].pieces.empty() || !exchange_->is_quiet(p)) return false;
+    patches_[p].ledger.contact_nodes = 0;
+    return true;
   }
   /// Notes the processor time that a patch takes.
   template <class F>
@@ -222,7 +235,7 @@ class Simulation {
   std::vector<SolverMaterial> materials_;
   std::vector<Body> bodies_;
   std::vector<Patch<Dim>> patches_;
-  std::vector<int> owner_;
+  PatchTable<Dim> table_;
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
   std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
   std::unique_ptr<NeighbourExchange> messages_;
@@ -233,11 +246,13 @@ class Simulation {
 
   double time_ = 0, dt_ = 0;
   std::int64_t steps_ = 0, total_points_ = 0;
+  std::int64_t patches_computed_ = 0;
+  std::size_t blank_before_ = 0;  // patches without points or history when they were last forgotten
   int times_balanced_ = 0;
   double seconds_balancing_ = 0;
   SpeedLimits speeds_;  // of this rank, in the step under way
-  static constexpr int speed_size = 5;
-  MaximumReduction maxima_{speed_size};  // wave, point, failure, stop, wall
+  static constexpr int speed_size = 6;
+  MaximumReduction maxima_{speed_size};  // wave, point, failure, stop, wall, whether points entered new patches
   int fault_urgency_ = 0;                // of this rank's first fault: the earlier its stage in the step, the more
   std::string fault_;
   bool marked_ = false;             // points of this rank were marked as lost in the step under way
