@@ -2,42 +2,16 @@
 
 #include <cmath>
 
-#include "cairn/body/pack.hpp"
 #include "cairn/body/points.hpp"
 #include "cairn/core/printable.hpp"
 #include "cairn/io/first_step.hpp"
 #include "cairn/material/registry.hpp"
+#include "cairn/solver/volume.hpp"
 #include "commands.hpp"
 #include "report.hpp"
 
 namespace cairn::app {
 namespace {
-
-constexpr int samples = 32;  // for each direction, to estimate the volume of a shape
-
-/// Area (2D) or volume (3D) of a shape inside the domain; directions that are periodic do not cut.
-double volume_of(const Shape& shape, const Domain& d) {
-  if (const auto* ball = std::get_if<Ball>(&shape))
-    return volume_inside(d.dimension, ball->centre, ball->radius, d.lower, d.upper, d.periodic);
-  Bounds b = bounds(shape);
-  Vec3 step = Vec3::Zero();
-  double volume = 1;
-  for (int k = 0; k < d.dimension; ++k) {
-    if (!d.periodic[k] || !std::isfinite(b.lower[k])) b.lower[k] = std::max(b.lower[k], d.lower[k]);
-    if (!d.periodic[k] || !std::isfinite(b.upper[k])) b.upper[k] = std::min(b.upper[k], d.upper[k]);
-    step[k] = std::max(0.0, b.upper[k] - b.lower[k]) / samples;
-    volume *= step[k];
-  }
-  std::int64_t inside = 0;
-  for (int k = 0; k < (d.dimension == 3 ? samples : 1); ++k)
-    for (int j = 0; j < samples; ++j)
-      for (int i = 0; i < samples; ++i) {
-        Vec3 x = b.lower + step.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
-        if (d.dimension == 2) x.z() = 0;
-        inside += contains(shape, x);
-      }
-  return volume * static_cast<double>(inside);
-}
 
 struct Estimate {
   double points = 0, bytes = 0;
@@ -56,12 +30,13 @@ Estimate estimate(const Case& c) {
   constexpr double node_columns[] = {12, 16};
   const Vec3 h = (d.upper - d.lower).cwiseQuotient(Vec3(d.cells[0], d.cells[1], d.cells[2]));
   const double cell = h[0] * h[1] * (dim == 3 ? h[2] : 1.0);
+  const int samples = samples_for(c.bodies.size(), dim);
   Estimate result;
   for (const auto& body : c.bodies) {
     const Bounds b = bounds(body.shape);
     double nodes = 1;
     for (int k = 0; k < dim; ++k) nodes *= std::min(b.upper[k] - b.lower[k], d.upper[k] - d.lower[k]) / h[k] + 4;
-    const double points = volume_of(body.shape, d) / cell * c.solver.points_per_cell;
+    const double points = volume_of(body.shape, d, samples) / cell * c.solver.points_per_cell;
     result.points += points;
     result.bytes += nodes * 8 * node_columns[dim - 2] + 1.25 * points * bytes_of_point(c.materials[body.material], dim);
   }

@@ -5,6 +5,7 @@
 #include <new>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/printable.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/case_changes.hpp"
 #include "cairn/io/case_folder.hpp"
@@ -63,6 +64,7 @@ class Run {
     if (from) restore(from->state());
     simulation_.ask([this] { return notice(); });
     open_files(from);
+    for (const auto& warning : simulation_.warnings()) fmt::print(stderr, "warning: {}\n", printable(warning));
   }
 
   /// \throws RunError on every rank, or RankError on those that failed alone

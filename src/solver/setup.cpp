@@ -11,6 +11,7 @@
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/simulation.hpp"
+#include "cairn/solver/volume.hpp"
 #include "memory.hpp"
 
 namespace cairn {
@@ -117,7 +118,8 @@ class Filler {
   /// by cell, then within the cell.
   template <class F>
   void for_points(PatchId patch, F&& f) const {
-    for (const auto& placed : bodies_of_.at(patch)) {
+    const auto& reaching = bodies_of_.at(patch);
+    for (const auto& placed : reaching) {
       const Shape& shape = case_.bodies[placed.body].shape;
       const Box<Dim> cells = intersection(placed.cells, lattice_.patch_cells(patch));
       Box<Dim> inside;
@@ -128,21 +130,26 @@ class Filler {
         for_each(inside, [&](const Index<Dim>& sub) {
           if (cut) {
             const PointSite site = cut->at(site_of(cell, sub));
-            if (site.share > 0) f(placed.body, site.position + placed.shift, site.share, placed.shift);
+            if (site.share > 0 && !is_held_already(reaching, placed, site.position + placed.shift))
+              f(placed.body, site.position + placed.shift, site.share, placed.shift);
             return;
           }
           Vec3 x = Vec3::Zero();
           for (int d = 0; d < Dim; ++d)
             x[d] = lattice_.lower()[d] + (cell[d] + (sub[d] + 0.5) / per_direction_) * lattice_.spacing()[d];
-          if (contains(shape, x - placed.shift + aside_)) f(placed.body, x, 1.0, placed.shift);
+          if (contains(shape, x - placed.shift + aside_) && !is_held_already(reaching, placed, x))
+            f(placed.body, x, 1.0, placed.shift);
         });
       });
     }
   }
 
+  /// Of a whole point [m^Dim].
+  double point_volume() const { return lattice_.cell_volume() / std::pow(per_direction_, Dim); }
+
   void fill(Patch<Dim>& patch, std::int64_t first_id) const {
     using C = PointColumns<Dim>;
-    const double volume = lattice_.cell_volume() / std::pow(per_direction_, Dim);
+    const double volume = point_volume();
     int filled = -1;  // points come body by body
     InitialState initial;
     for_points(patch.id, [&](int b, const Vec3& x, double share, const Vec3& shift) {
@@ -182,6 +189,18 @@ class Filler {
     Box<Dim> cells;  // that its bounds touch
   };
 
+  /// Whether another image of the body holds a point and comes first: the body itself, then the images in their order.
+  bool is_held_already(const std::vector<Placed>& reaching, const Placed& placed, const Vec3& x) const {
+    if (placed.shift == Vec3::Zero()) return false;
+    bool before = true;
+    for (const Placed& other : reaching) {
+      if (&other == &placed) before = false;
+      if (other.body != placed.body || &other == &placed || (!before && other.shift != Vec3::Zero())) continue;
+      if (contains(case_.bodies[other.body].shape, x - other.shift + aside_)) return true;
+    }
+    return false;
+  }
+
   /// Whether points at the shape's surface are cut; what is thinner than two points would lose them.
   bool is_cut(const Shape& shape) const {
     return case_.solver.surface == Surface::cut && is_round(shape) &&
@@ -204,8 +223,14 @@ class Filler {
   void list_images(int b) {
     const Bounds all = bounds(case_.bodies[b].shape);
     Box<Dim> images;
-    for (int d = 0; d < Dim; ++d)
-      images.lower[d] = lattice_.periodic(d) ? -1 : 0, images.upper[d] = lattice_.periodic(d) ? 2 : 1;
+    for (int d = 0; d < Dim; ++d) {
+      const double length = lattice_.length(d);
+      images.upper[d] = 1;
+      // What has no end along a periodic direction is the same in every period: once is enough.
+      if (!lattice_.periodic(d) || !std::isfinite(all.lower[d]) || !std::isfinite(all.upper[d])) continue;
+      images.lower[d] = static_cast<int>(std::floor((lattice_.lower()[d] - all.upper[d]) / length));
+      images.upper[d] = static_cast<int>(std::ceil((lattice_.upper()[d] - all.lower[d]) / length)) + 1;
+    }
     for_each(images, [&](const Index<Dim>& image) {
       Placed placed{b, Vec3::Zero(), {}};
       for (int d = 0; d < Dim; ++d) {
@@ -234,6 +259,33 @@ class Filler {
   int per_direction_;
   std::map<PatchId, std::vector<Placed>> bodies_of_;  // ascending in body
 };
+
+/// Says which bodies got more or less mass than their shapes have. `placed`: whole points of each.
+std::vector<std::string> mass_warnings(const Case& c, const std::vector<double>& placed, double point_volume) {
+  constexpr double tolerated = 0.05;
+  constexpr std::size_t most = 5;  // said one by one
+  const int samples = samples_for(c.bodies.size(), c.domain.dimension);
+  std::vector<std::string> warnings;
+  std::size_t others = 0;
+  for (std::size_t b = 0; b < placed.size(); ++b) {
+    const double density = c.materials[c.bodies[b].material].density;
+    const double mass = density * placed[b] * point_volume,
+                 whole = density * volume_of(c.bodies[b].shape, c.domain, samples);
+    if (std::abs(mass - whole) <= tolerated * whole) continue;
+    if (warnings.size() == most) {
+      ++others;
+      continue;
+    }
+    warnings.push_back(fmt::format(
+        "{}: the points of body {} have {:.4g} kg, density x volume of its shape is {:.4g} kg ({:+.1f} %); use smaller "
+        "cells, or sizes that are whole numbers of points",
+        c.bodies[b].source, b, mass, whole, 100 * (mass / whole - 1)));
+  }
+  if (others > 0)
+    warnings.push_back(fmt::format("the masses of {} more bodies differ from their shapes' by more than {:.0f} %",
+                                   others, 100 * tolerated));
+  return warnings;
+}
 
 /// \throws InputError on every rank where a body got no point at all
 void check_bodies(const Case& c, std::vector<std::int64_t>& points_of_body, MPI_Comm comm) {
@@ -328,10 +380,15 @@ void Simulation<Dim>::place_points(const Case& c) {
   const Filler<Dim> filler(c, lattice_, bodies_, materials_);
   const std::vector<PatchId> reached = filler.patches();
   std::vector<std::int64_t> count(reached.size(), 0), of_body(bodies_.size(), 0);
+  std::vector<double> volume(bodies_.size(), 0);  // placed, in whole points
   for (std::size_t p = rank_; p < reached.size(); p += ranks_)
-    filler.for_points(reached[p], [&](int body, const Vec3&, double, const Vec3&) { ++count[p], ++of_body[body]; });
+    filler.for_points(reached[p], [&](int body, const Vec3&, double share, const Vec3&) {
+      ++count[p], ++of_body[body], volume[body] += share;
+    });
   MPI_Allreduce(MPI_IN_PLACE, count.data(), static_cast<int>(count.size()), MPI_INT64_T, MPI_SUM, comm_);
   check_bodies(c, of_body, comm_);
+  MPI_Allreduce(MPI_IN_PLACE, volume.data(), static_cast<int>(volume.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  if (rank_ == 0) warnings_ = mass_warnings(c, volume, filler.point_volume());
   std::vector<PatchId> filled;
   std::vector<std::int64_t> points;
   for (std::size_t p = 0; p < reached.size(); ++p)

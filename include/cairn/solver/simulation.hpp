@@ -82,6 +82,8 @@ class Simulation {
   double dt() const { return dt_; }  // of the last step
   std::int64_t steps() const { return steps_; }
   std::int64_t total_points() const { return total_points_; }
+  /// What set-up found that may not be meant; on rank 0.
+  const std::vector<std::string>& warnings() const { return warnings_; }
   const Lattice<Dim>& lattice() const { return lattice_; }
   const TransferSettings<Dim>& transfer() const { return transfer_; }
   const std::vector<SolverMaterial>& materials() const { return materials_; }
@@ -246,6 +248,7 @@ class Simulation {
 
   double time_ = 0, dt_ = 0;
   std::int64_t steps_ = 0, total_points_ = 0;
+  std::vector<std::string> warnings_;
   std::int64_t patches_computed_ = 0;
   std::size_t blank_before_ = 0;  // patches without points or history when they were last forgotten
   int times_balanced_ = 0;
