@@ -3,7 +3,8 @@
 
 namespace cairn {
 
-/// What the system can give without swapping [bytes]; infinite where it does not say.
+/// What the system can give without swapping, and what the limits of control groups (containers, Slurm) leave [bytes];
+/// infinite where it does not say.
 double available_memory();
 
 /// What this process may use: the lowest of its limits (ulimit -v, ulimit -m) [bytes]; infinite where there is none.
