@@ -47,11 +47,13 @@ def owners(run: Run, frame: Frame, pixels: int = PIXELS) -> np.ndarray:
 
 def grain_picture(run: Run, frame: Frame, pixels: int = PIXELS) -> tuple[np.ndarray, tuple]:
     """Bodies in different colours on black, and the extent of the picture (left, right, bottom, top) [m]."""
+    if frame.points == 0:
+        raise MissingData(f"{frame.path.name} holds no points")
     body, driven = frame.field("body"), run.driven_bodies
     if run.dimension == 2:
         extent = (run.lower[0], run.upper[0], run.lower[1], run.upper[1])
         return raster.paint_bodies(owners(run, frame, pixels), body, driven), extent
-    gravity = np.abs(run.case["domain"].get("gravity", [0, 1, 0]))
+    gravity = np.abs(run.gravity)
     up = int(gravity.argmax()) if gravity.max() > 0 else 1
     ends = np.array([run.lower, run.upper])
     corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -136,6 +138,8 @@ def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -
         frames = [run.frame_at_shear(fraction) for fraction in FIGURE_7_SHEAR]
     except MissingData:
         frames = [run.frames[-1]]
+    if any(frame.points == 0 for frame in frames):
+        raise MissingData("there are no points any more")
     values = [principal_stress_difference(run.stress(frame)) for frame in frames]
     top = max(float(np.percentile(value, 99)) for value in values)
     figure, row = plt.subplots(1, len(frames), figsize=(7 * len(frames), 7), squeeze=False)

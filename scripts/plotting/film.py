@@ -22,6 +22,8 @@ def film(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
     """Writes film.mp4 where ffmpeg is installed, else film.gif."""
     if len(run.frames) < 2:
         raise MissingData("a film needs two or more particles_*.vtkhdf files")
+    if any(frame.points == 0 for frame in run.frames):
+        raise MissingData("a particles_*.vtkhdf file holds no points")
     pictures = list(_pictures(run))
     ffmpeg = shutil.which("ffmpeg")
     if ffmpeg:

@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from figures import FIGURES
-from results import Frame, MissingData, Run
+from results import Damaged, Frame, MissingData, Run
 
 PICTURES = """pictures:
   grains_start.png          bodies at the start
@@ -42,58 +42,56 @@ def arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def draw_fringes(path: Path, parameter: float, times: list[float], raw_stress: bool) -> int:
+def pictures_of(run: Run) -> Path:
+    """The folder of the pictures, made where it is missing; it must not lead out of the results."""
+    folder = run.folder / "pictures"
+    if folder.is_symlink():
+        raise Damaged(f"{folder} is a link, which is not followed; remove it")
+    if folder.exists() and not folder.is_dir():
+        raise Damaged(f"{folder} is not a folder; move it away")
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+def fringes(options: argparse.Namespace) -> int:
     """photoelastic.png of a result folder, or of one particle file, in the folder's pictures."""
     from photoelastic import photoelastic
 
-    if not parameter > 0:
-        print(f"plot: --fringes {parameter:g}: must be above 0 Pa", file=sys.stderr)
+    if not options.fringes > 0:
+        print(f"plot: --fringes {options.fringes:g}: must be above 0 Pa", file=sys.stderr)
         return 2
-    try:
-        run = Run(path.parent if path.is_file() else path)
-        run.raw_stress = raw_stress
-        if path.is_file():
-            run.frames = [Frame(path)]
-        folder = run.folder / "pictures"
-        folder.mkdir(exist_ok=True)
-        for name in photoelastic(run, parameter, times, folder):
+    path = options.run
+    run = Run(path.parent if path.is_file() else path)
+    run.raw_stress = options.raw_stress
+    if path.is_file():
+        run.frames = [Frame(path)]
+    folder = pictures_of(run)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".") as drafts:
+        for name in photoelastic(run, options.fringes, options.times, Path(drafts)):
+            os.replace(Path(drafts) / name, folder / name)
             print(f"  {folder / name}")
-    except (MissingData, OSError) as error:
-        print(f"plot: {error}", file=sys.stderr)
-        return 2
     return 0
 
 
-def main() -> int:
-    options = arguments()
-    if options.fringes is not None:
-        return draw_fringes(options.run, options.fringes, options.times, options.raw_stress)
-    try:
-        run = Run(options.run)
-        other = Run(options.compare) if options.compare else None
-    except MissingData as error:
-        print(f"plot: {error}", file=sys.stderr)
-        return 2
+def pictures(options: argparse.Namespace) -> int:
+    """All pictures of a result folder."""
+    run = Run(options.run)
+    other = Run(options.compare) if options.compare else None
     run.raw_stress = options.raw_stress
     figures = list(FIGURES)
     if options.film:
         from film import film
 
         figures.append(film)
-    print(f"Drawing {run.folder}")
-    try:
-        draw(run, other, figures)
-    except (OSError, subprocess.CalledProcessError) as error:
-        print(f"plot: cannot write the pictures: {error}", file=sys.stderr)
-        return 3
+    print(f"Drawing {run.folder}{': THE RUN FAILED' if run.failed else ''}")
+    draw(run, other, figures)
     return 0
 
 
 def draw(run: Run, other: Run | None, figures: list) -> None:
     """Draws each picture in a folder of its own first, so that what has its final name is whole."""
-    folder = run.folder / "pictures"
-    folder.mkdir(exist_ok=True)
-    summary = {"title": run.title}
+    folder = pictures_of(run)
+    summary = {"title": run.title, "failed": run.failed}
     with tempfile.TemporaryDirectory(dir=folder, prefix=".") as drafts:
         for figure in figures:
             try:
@@ -105,6 +103,27 @@ def draw(run: Run, other: Run | None, figures: list) -> None:
         draft = Path(drafts) / "summary.json"
         draft.write_text(json.dumps(summary, indent=2) + "\n")
         os.replace(draft, folder / draft.name)
+
+
+def main() -> int:
+    options = arguments()
+    try:
+        return pictures(options) if options.fringes is None else fringes(options)
+    except (MissingData, Damaged) as error:
+        return refuse(str(error), 2)
+    except (OSError, subprocess.CalledProcessError) as error:
+        return refuse(f"cannot write the pictures: {error}", 3)
+    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as error:
+        # Each file can be read, but they are not of one run. CAIRN_TRACEBACK=1 shows where, should it be a fault here.
+        if os.environ.get("CAIRN_TRACEBACK"):
+            raise
+        return refuse(f"{options.run}: the results do not fit together: {type(error).__name__}: {error}", 2)
+
+
+def refuse(text: str, code: int) -> int:
+    """One line of error."""
+    print("plot: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":

@@ -5,7 +5,10 @@ All quantities are in SI units. In two dimensions volumes are areas [m2] (plane 
 
 from __future__ import annotations
 
+import csv
+import json
 import tomllib
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,8 +19,28 @@ import numpy as np
 FACES = ("left", "right", "bottom", "top", "back", "front")  # axis = index // 2
 
 
+COMPONENTS = {"position": 3, "velocity": 3, "spin": 3, "image": 3, "stress": 6, "stress_smooth": 6,
+              "deformation_gradient": 9}  # of fields; the others have one
+
+
 class MissingData(Exception):
     """A picture cannot be drawn from these results; the message says what is missing."""
+
+
+class Damaged(Exception):
+    """A result file is not what a run leaves; the message names it and says why."""
+
+
+@contextmanager
+def reading(path: Path):
+    """Whatever goes wrong while `path` is read becomes Damaged: the libraries raise errors of many types."""
+    try:
+        yield
+    except (MissingData, Damaged):
+        raise
+    except Exception as error:
+        reason = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+        raise Damaged(f"{path} cannot be read: {reason.splitlines()[0] if reason else type(error).__name__}") from error
 
 
 @dataclass
@@ -45,11 +68,14 @@ class Frame:
 
     def __init__(self, path: Path):
         self.path = path
-        with h5py.File(path, "r") as file:
+        with reading(path), h5py.File(path, "r") as file:
             group = file["VTKHDF"] if "VTKHDF" in file else file
             self.time = float(_attribute(group, file, "time"))  # [s]
             self.step = int(_attribute(group, file, "step"))
+            if not np.isfinite(self.time):
+                raise ValueError(f"its time is {self.time}")
             self._names = set(group["PointData"].keys()) if "PointData" in group else set()
+            self.points = group["Points"].shape[0]
 
     def has(self, name: str) -> bool:
         return name in self._names or name == "position"
@@ -59,16 +85,22 @@ class Frame:
         stress (N x 6: xx yy zz xy yz xz) [Pa], volume (N) [m3, m2 in 2D], body, id, image (N x 3), ..."""
         if not self.has(name):
             raise MissingData(f"{self.path.name} holds no field '{name}' (see output.particles.fields)")
-        with h5py.File(self.path, "r") as file:
+        with reading(self.path), h5py.File(self.path, "r") as file:
             group = file["VTKHDF"] if "VTKHDF" in file else file
-            return (group["Points"] if name == "position" else group["PointData"][name])[()]
+            values = (group["Points"] if name == "position" else group["PointData"][name])[()]
+            expected = (self.points, COMPONENTS[name]) if name in COMPONENTS else (self.points,)
+            if values.shape != expected or values.dtype.kind not in "iuf":
+                raise ValueError(f"'{name}' is {values.dtype} of shape {values.shape}, not numbers of shape {expected}")
+            if not np.isfinite(values).all() or (name == "body" and values.size and values.min() < 0):
+                raise ValueError(f"'{name}' holds values that no run writes")
+            return values
 
 
 def _attribute(group: h5py.Group, file: h5py.File, name: str):
     for holder in (group, file):
         if name in holder.attrs:
             return np.ravel(holder.attrs[name])[0]
-    raise MissingData(f"{file.filename} has no attribute '{name}'")
+    raise ValueError(f"it has no attribute '{name}'")
 
 
 class Run:
@@ -79,18 +111,42 @@ class Run:
         case_file = self.folder / "case.toml"
         if not case_file.is_file():
             raise MissingData(f"{self.folder} is not a result folder: it has no case.toml")
-        with open(case_file, "rb") as file:
-            self.case = tomllib.load(file)
-        domain = self.case["domain"]
+        with reading(case_file):
+            self._read_case(tomllib.loads(case_file.read_text(encoding="utf-8")))
+        self.failed = self._has_failed()
+        if self.failed:
+            self.title += " - THE RUN FAILED"
+        self.frames = [Frame(path) for path in sorted(self.folder.glob("particles_*.vtkhdf"))]
+        self.raw_stress = False  # pictures show the points' stress as computed
+
+    def _read_case(self, case: dict) -> None:
+        self.case = case
+        domain = case["domain"]
         self.dimension = int(domain.get("dimension", len(domain["lower"])))
+        if self.dimension not in (2, 3):
+            raise ValueError(f"domain.dimension is {self.dimension}")
         self.lower = np.array(domain["lower"][: self.dimension], float)  # [m]
         self.upper = np.array(domain["upper"][: self.dimension], float)
         self.cells = self._cells(domain)
-        periodic = domain.get("periodic", [False] * self.dimension)
-        self.periodic = np.array(periodic[: self.dimension], bool)
-        self.title = self.case.get("title", self.folder.name)
-        self.frames = [Frame(path) for path in sorted(self.folder.glob("particles_*.vtkhdf"))]
-        self.raw_stress = False  # pictures show the points' stress as computed
+        self.periodic = np.zeros(self.dimension, bool)
+        self.periodic[:] = domain.get("periodic", [False] * self.dimension)[: self.dimension]
+        sizes = (self.upper - self.lower) / self.cells
+        if sizes.shape != (self.dimension,) or not (np.isfinite(sizes) & (sizes > 0)).all():
+            raise ValueError("the domain has no size, or its cells have none")
+        self.gravity = self._vector(domain.get("gravity"))  # [m/s2]
+        self.title = str(case.get("title") or self.folder.resolve().name)
+        self._velocities = self._face_velocities()
+        self._prescribed = [self._vector(drive.get("velocity")) for drive in case.get("drive", [])]  # [m/s]
+        if not self.point_spacing > 0:
+            raise ValueError(f"solver.points_per_cell gives a spacing of {self.point_spacing}")
+
+    def _has_failed(self) -> bool:
+        """Whether the last run into this folder failed: it says so itself, or it left its last state."""
+        record = self.folder / "run.json"
+        if not record.is_file():
+            return (self.folder / "failure_particles.vtkhdf").is_file()
+        with reading(record):
+            return json.loads(record.read_text(encoding="utf-8"))["runs"][-1]["exit_code"] == 3
 
     def stress_name(self, frame: Frame) -> str:
         """The field of stress that pictures show: the smooth one where the file holds it, and raw is not asked for."""
@@ -118,7 +174,7 @@ class Run:
 
     def shear(self) -> Shear | None:
         """The shearing motion that drives the run, or None."""
-        velocities = self._face_velocities()
+        velocities = self._velocities
         for axis in range(self.dimension):
             pair = [velocities.get(face) for face in FACES[2 * axis : 2 * axis + 2]]
             if pair[0] is None or pair[1] is None:
@@ -145,6 +201,8 @@ class Run:
         components = np.zeros(self.dimension)
         if value is not None:
             components[:] = value[: self.dimension]
+        if not np.isfinite(components).all():
+            raise ValueError(f"a vector is {value}")
         return components
 
     def frame_at_shear(self, fraction: float) -> Frame:
@@ -163,27 +221,28 @@ class Run:
     def driven_bodies(self) -> np.ndarray:
         """Ids of the bodies moved as rigid parts: all their points keep one and the same prescribed velocity."""
         last = self.frames[-1]
-        if not (self.case.get("drive") and last.has("velocity") and last.has("body")):
+        if not (self._prescribed and last.points and last.has("velocity") and last.has("body")):
             return np.array([], int)
-        velocity, body = last.field("velocity")[:, : self.dimension], last.field("body")
-        prescribed = [self._vector(drive.get("velocity")) for drive in self.case["drive"]]
+        velocity = last.field("velocity")[:, : self.dimension]
+        bodies, body = np.unique(last.field("body"), return_inverse=True)
         tolerance = 1e-9 * max(np.abs(velocity).max(), 1e-300)
         moved = np.zeros(len(body), bool)
-        for value in prescribed:
+        for value in self._prescribed:
             moved |= (np.abs(velocity - value) <= tolerance).all(axis=1)
-        points = np.bincount(body)
-        return np.flatnonzero((points > 0) & (np.bincount(body, weights=moved) == points))
+        return bodies[np.bincount(body, weights=moved) == np.bincount(body)]
 
     def mean_diameter(self) -> float:
         """Mean diameter [m] of the bodies that are not driven, from their volume at the start."""
         frame = self.frames[0]
-        body = frame.field("body")
+        bodies, body = np.unique(frame.field("body"), return_inverse=True)
         if frame.has("volume"):
             weights = frame.field("volume")
         else:
             weights = np.full(len(body), self.point_spacing**self.dimension)
         volume = np.bincount(body, weights=weights)
-        free = np.setdiff1d(np.flatnonzero(volume > 0), self.driven_bodies)
+        free = ~np.isin(bodies, self.driven_bodies)
+        if not free.any():
+            raise MissingData("all bodies are driven, so that there is no mean diameter")
         factor = {2: 4 / np.pi, 3: 6 / np.pi}[self.dimension]
         return float(np.mean((factor * volume[free]) ** (1 / self.dimension)))
 
@@ -192,10 +251,19 @@ class Run:
         path = self.folder / "history.csv"
         if not path.is_file():
             raise MissingData("there is no history.csv (see output.history)")
-        table = np.genfromtxt(path, delimiter=",", names=True, deletechars="", encoding="utf-8")
-        if table.size == 0:
+        with reading(path):
+            whole = path.read_text(encoding="utf-8").rpartition("\n")[0]  # a run that was killed may leave part of a line
+            names, *rows = list(csv.reader(whole.splitlines())) or [[]]
+            if "time" not in names:
+                raise ValueError("it has no column 'time'")
+            if any(len(row) != len(names) for row in rows):
+                raise ValueError("its lines are not equally long")
+            table = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(names))
+            if not np.isfinite(table[:, names.index("time")]).all():
+                raise ValueError("a time is not finite")
+        if len(table) == 0:
             raise MissingData("history.csv has no rows")
-        return {name: np.atleast_1d(table[name]) for name in table.dtype.names}
+        return dict(zip(names, table.T))
 
 
 def principal_stress_difference(stress: np.ndarray) -> np.ndarray:

@@ -3,8 +3,10 @@
     test_plot.py CAIRN SCRATCH
 """
 
+import concurrent.futures
 import importlib.util
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -222,12 +224,134 @@ def nothing(scratch: Path):
     assert "Traceback" not in done.stderr, done.stderr
 
 
+def small_run(folder: Path):
+    """A made-up run of three frames."""
+    write_run(folder, "Small", (0.0, WIDTH), 1.0)
+    for path in sorted(folder.glob("particles_*.vtkhdf"))[3:]:
+        path.unlink()
+
+
+def edited(change):
+    """Applies `change` to the open group VTKHDF of the last frame."""
+    def damage(folder: Path):
+        with h5py.File(folder / "particles_000002.vtkhdf", "r+") as file:
+            change(file["VTKHDF"])
+    return damage
+
+
+def replaced(group, name: str, values):
+    del group[name]
+    group[name] = values
+
+
+def rewritten(name: str, change):
+    """Applies `change` to the text of a file."""
+    def damage(folder: Path):
+        (folder / name).write_text(change((folder / name).read_text()))
+    return damage
+
+
+def cut(name: str, size: int):
+    return lambda folder: (folder / name).write_bytes((folder / name).read_bytes()[:size])
+
+
+def as_link(folder: Path):
+    (folder.parent / "elsewhere").mkdir(exist_ok=True)
+    (folder / "pictures").symlink_to("../elsewhere")
+
+
+PARTICLES = "particles_000002.vtkhdf"
+DAMAGE = {
+    "case_empty": cut("case.toml", 0), "case_cut": cut("case.toml", 60),
+    "case_no_toml": rewritten("case.toml", lambda t: "= = ="), "case_a_list": rewritten("case.toml", lambda t: "domain = [1]"),
+    "case_bytes": lambda f: (f / "case.toml").write_bytes(b"title = '\xff\xfe'\n"),
+    "case_one_dimension": rewritten("case.toml", lambda t: t.replace("dimension = 2", "dimension = 1")),
+    "case_word": rewritten("case.toml", lambda t: t.replace(f"cells = [{CELLS}, {CELLS}]", "cells = 'many'")),
+    "case_no_size": rewritten("case.toml", lambda t: t.replace(f"upper = [{WIDTH}, {WIDTH}]", "upper = [0.0, 0.0]")),
+    "case_velocity": rewritten("case.toml", lambda t: t.replace(f"velocity = [0.0, {SPEED}]", "velocity = 'fast'")),
+    "case_points": rewritten("case.toml", lambda t: t.replace("points_per_cell = 4", "points_per_cell = -4")),
+    "frame_empty": cut(PARTICLES, 0), "frame_cut": cut(PARTICLES, 5000),
+    "frame_text": lambda f: (f / PARTICLES).write_text("step,time\n"),
+    "frame_no_points": edited(lambda g: g.__delitem__("Points")),
+    "frame_no_time": edited(lambda g: g.attrs.__delitem__("time")),
+    "frame_nan_time": edited(lambda g: g.attrs.__setitem__("time", np.nan)),
+    "frame_short_field": edited(lambda g: replaced(g, "PointData/body", np.zeros(3, int))),
+    "frame_flat_positions": edited(lambda g: replaced(g, "Points", np.zeros(7))),
+    "frame_nan": edited(lambda g: replaced(g, "PointData/stress", np.full(g["PointData/stress"].shape, np.nan))),
+    "frame_words": edited(lambda g: replaced(g, "PointData/body", np.array([b"a"] * len(g["Points"])))),
+    "frame_negative_body": edited(lambda g: replaced(g, "PointData/body", -1 - np.arange(len(g["Points"])))),
+    "frame_a_folder": lambda f: ((f / PARTICLES).unlink(), (f / PARTICLES).mkdir()),
+    "history_empty": cut("history.csv", 0), "history_words": rewritten("history.csv", lambda t: t.replace("\n10,", "\nten,")),
+    "history_ragged": rewritten("history.csv", lambda t: t.replace("\n10,", "\n10,10,")),
+    "history_no_time": rewritten("history.csv", lambda t: t.replace("time", "when", 1)),
+    "record_cut": lambda f: (f / "run.json").write_text('{ "runs": ['),
+    "pictures_a_file": lambda f: (f / "pictures").write_text(""), "pictures_a_link": as_link,
+}
+
+
+def damaged(scratch: Path):
+    """Whatever is wrong with a folder of results: exit code 2 and one line that names what; no link is followed."""
+    small_run(scratch / "sound")
+    plot(scratch / "sound")
+    shutil.rmtree(scratch / "sound" / "pictures")
+    problems = []
+
+    def attempt(name: str):
+        folder = scratch / f"damaged_{name}"
+        shutil.copytree(scratch / "sound", folder)
+        DAMAGE[name](folder)
+        return folder, subprocess.run([ROOT / "scripts" / "plot", folder], capture_output=True, text=True, check=False)
+
+    with concurrent.futures.ThreadPoolExecutor(2) as workers:
+        results = list(workers.map(attempt, DAMAGE))
+    for name, (folder, done) in zip(DAMAGE, results):
+        if done.returncode != 2 or len(done.stderr.splitlines()) != 1 or not done.stderr.startswith("plot: "):
+            problems.append(f"{name}: exit code {done.returncode}: {done.stderr}")
+        elif str(folder) not in done.stderr:
+            problems.append(f"{name}: the folder is not named: {done.stderr}")
+    for name in ("--fringes", "1e6"), ():
+        done = subprocess.run([ROOT / "scripts" / "plot", scratch / "damaged_pictures_a_link", *name],
+                              capture_output=True, text=True, check=False)
+        if done.returncode != 2 or list((scratch / "elsewhere").iterdir()):
+            problems.append(f"a link was followed: {done.returncode} {done.stderr}")
+    assert not problems, "\n".join(problems)
+
+
+def last_line_cut(scratch: Path):
+    """A run that was killed may leave part of a line, which is left out."""
+    small_run(scratch / "killed")
+    with open(scratch / "killed" / "history.csv", "a", encoding="utf-8") as file:
+        file.write("110,1.2e-")
+    plot(scratch / "killed")
+    check_picture(scratch / "killed" / "pictures" / "energy.png")
+
+
+def failed(cairn: Program, scratch: Path):
+    """The pictures of a run that failed say so, and those of one that went on from there do not."""
+    case, out = ROOT / "cases" / "two_disks.toml", scratch / "failed"
+    few = {"time.steps": 30, "output.history": "{ every = 1 }", "output.particles": "{ every = 10 }"}
+    done = cairn("run", case, "--out", out, *sets(few | {"solver.energy_limit": 1e-9}))
+    assert done.code == 3, f"exit code {done.code} {done.err}"
+    assert "THE RUN FAILED" in plot(out)
+    summary = json.loads((out / "pictures" / "summary.json").read_text())
+    assert summary["failed"] and summary["title"].endswith("THE RUN FAILED"), summary
+    check_picture(out / "pictures" / "grains_start.png")
+    done = cairn("run", case, "--out", out, "--overwrite", *sets(few))
+    assert done.code == 0, done.err
+    assert "FAILED" not in plot(out)
+    summary = json.loads((out / "pictures" / "summary.json").read_text())
+    assert not summary["failed"] and "FAILED" not in summary["title"], summary
+
+
 def main():
     cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
     nothing(scratch)
     synthetic(scratch)
     fringes(scratch)
     smooth(scratch)
+    damaged(scratch)
+    last_line_cut(scratch)
+    failed(cairn, scratch)
     real(cairn, scratch)
 
 
