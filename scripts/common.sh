@@ -14,10 +14,14 @@ die() {
 # Number of cores this process may use.
 core_count() { nproc 2>/dev/null || getconf _NPROCESSORS_ONLN; }
 
+# absolute PATH: seen from the folder where the script was called.
+absolute() { [[ $1 == /* ]] && printf '%s' "$1" || printf '%s' "$PWD/$1"; }
+
 # print_help FILE: the comment at the top of a script, as its help text.
 print_help() { sed -n '2,/^[^#]/{s/^# \{0,1\}//p}' "$1"; }
 
-# set_mpirun RANKS: fills the array MPIRUN with the launcher and its options.
+# set_mpirun RANKS: fills the array MPIRUN with the launcher and its options. What Open MPI needs beside them is said
+# in its variables, so that any MPI's mpirun serves.
 set_mpirun() {
   local ranks=$1
   MPIRUN=(mpirun -n "$ranks")
@@ -25,8 +29,7 @@ set_mpirun() {
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
     export OMPI_MCA_btl_vader_single_copy_mechanism=none # which containers forbid, with a warning for each message
   fi
-  if ((ranks > $(core_count))); then # ranks that share a core must give way to each other
-    export OMPI_MCA_mpi_yield_when_idle=1
-    MPIRUN+=(--oversubscribe)
+  if ((ranks > $(core_count))); then # Open MPI refuses that, too; ranks that share a core must give way to each other
+    export OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_mpi_yield_when_idle=1
   fi
 }

@@ -37,7 +37,7 @@ def environment(ranks: int) -> dict[str, str]:
         variables.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
                          OMPI_MCA_btl_vader_single_copy_mechanism="none")
     if ranks > (os.cpu_count() or 1):
-        variables["OMPI_MCA_mpi_yield_when_idle"] = "1"
+        variables.update(OMPI_MCA_mpi_yield_when_idle="1", OMPI_MCA_rmaps_base_oversubscribe="1")
     return variables
 
 
@@ -58,8 +58,6 @@ class Program:
         """Runs a case; its results are removed unless `keep`."""
         out = self.scratch / "out"
         launcher = [] if ranks == 1 else ["mpirun", "-n", str(ranks)]
-        if ranks > (os.cpu_count() or 1):
-            launcher.append("--oversubscribe")
         command = [*launcher, str(self.cairn), "run", str(case), "--out", str(out), "--overwrite", "--profile"]
         for key, value in settings.items():
             command += ["--set", f"{key}={value}"]

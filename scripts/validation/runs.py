@@ -105,7 +105,7 @@ class Runner:
             out.mkdir()
             return self.call(out, [str(self.tool(run)), *run.tool[1:]], 1)
         ranks = run.ranks or self.ranks
-        command = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+        command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
         command += [str(self.program), "run", str(CASES / f"{run.case}.toml"), "--out", str(out)]
         if before:
             command += ["--restart", str(max(before.folder.glob("checkpoint_*.h5"))), "--allow-changes"]

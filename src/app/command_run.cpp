@@ -6,7 +6,9 @@
 #include "cairn/io/case_folder.hpp"
 #include "cairn/io/folder_lock.hpp"
 #include "cairn/io/own_files.hpp"
+#include "cairn/io/program_facts.hpp"
 #include "cairn/io/result_files.hpp"
+#include "cairn/io/run_record.hpp"
 #include "cairn/solver/run.hpp"
 #include "commands.hpp"
 #include "report.hpp"
@@ -56,7 +58,7 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
-/// The command of this run without --restart, with a space at its end.
+/// The command of this run without --restart and what belongs to it, with a space at its end.
 std::string command_line(const RunArguments& arguments, const fs::path& out) {
   int ranks = 1;
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
@@ -64,6 +66,18 @@ std::string command_line(const RunArguments& arguments, const fs::path& out) {
   text += fmt::format("{} run {} --out {} ", quoted(arguments.program), quoted(arguments.file.string()),
                       quoted(out.string()));
   for (const auto& [key, value] : arguments.overrides) text += fmt::format("--set {} ", quoted(key + "=" + value));
+  return text;
+}
+
+/// The whole command of this run.
+std::string whole_command(const RunArguments& arguments, const RunSettings& settings) {
+  std::string text = settings.command;
+  if (!settings.restart.empty()) text += fmt::format("--restart {} ", quoted(settings.restart));
+  for (const auto& [given, option] :
+       {std::pair(settings.overwrite, "--overwrite "), std::pair(settings.allow_changes, "--allow-changes "),
+        std::pair(arguments.profile, "--profile ")})
+    if (given) text += option;
+  text.pop_back();
   return text;
 }
 
@@ -80,6 +94,8 @@ int command_run(const RunArguments& arguments) {
   settings.profile = arguments.profile, settings.overwrite = arguments.overwrite;
   settings.allow_changes = arguments.allow_changes;
   settings.command = command_line(arguments, settings.out);
+  RunRecord record(settings.out, whole_command(arguments, settings), MPI_COMM_WORLD);
+  settings.record = &record;
   std::vector<fs::path> made;
   FolderLock lock;  // of rank 0
   const auto prepare = [&] {
@@ -90,10 +106,17 @@ int command_run(const RunArguments& arguments) {
     if (!settings.overwrite && settings.restart.empty()) check_free(settings.out);
     if (const std::string reason = check_targets(c, settings.out); !reason.empty())
       throw InputError("--out: " + reason);
+    const ProgramFacts& facts = program_facts();
+    fmt::print("cairn {} ({}), {}\n", facts.version, facts.commit, facts.instruction_set);
+    std::fflush(stdout);
   };
   int code = on_first_rank(prepare);
   if (code == done)
     if (const int error = settle(attempt([&] { code = run_case(c, settings, MPI_COMM_WORLD); }))) code = error;
+  const auto close_record = [&] {
+    if (const std::string error = record.end(code); !error.empty() && code != failed) throw RunError(error);
+  };
+  if (const int error = on_first_rank(close_record)) code = error;
   lock.release();
   std::error_code ignored;
   if (code == wrong_input)

@@ -28,8 +28,12 @@ int command_run(const RunArguments& arguments);
 int command_check(const std::filesystem::path& file, const std::vector<Override>& overrides);
 int command_info(const std::filesystem::path& file);
 int command_pack(const PackArguments& arguments);
+/// Writes a commented first case; the file must not be there.
+int command_init(const std::filesystem::path& file);
+/// Explains the keys of the case file that hold the pattern; lists all where it is empty.
+int command_keys(const std::string& pattern);
 
-/// Version, compiler, libraries and instruction set.
+/// Version, commit, compiler, libraries and instruction set.
 std::string version_text();
 
 }  // namespace cairn::app

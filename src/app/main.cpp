@@ -1,5 +1,6 @@
 // The command line: parses the arguments and calls the command.
 
+#include <fmt/format.h>
 #include <mpi.h>
 
 #include <CLI/CLI.hpp>
@@ -7,7 +8,10 @@
 #include <iostream>
 #include <sstream>
 
+#include "cairn/core/error.hpp"
+#include "cairn/io/program_facts.hpp"
 #include "commands.hpp"
+#include "installed.hpp"
 #include "report.hpp"
 
 namespace cairn::app {
@@ -18,7 +22,11 @@ struct Arguments {
   RunArguments run;
   PackArguments pack;
   std::vector<std::string> sets;
+  std::string pattern;
 };
+
+constexpr const char* exit_codes =
+    "Exit codes: 0 done; 2 the input is wrong; 3 the run failed; 4 stopped by a signal after a checkpoint";
 
 /// "KEY=VALUE" to its parts. \throws CLI::ValidationError
 Override parse_override(const std::string& text) {
@@ -41,6 +49,8 @@ void add_sets(CLI::App* command, Arguments& a) {
 void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
   app.require_subcommand(1);
   app.set_version_flag("--version", version_text);
+  const std::string pages = manual();
+  app.footer(fmt::format("{}\nManual: {}", exit_codes, pages.empty() ? "README.md and docs of the source" : pages));
 
   CLI::App* run = app.add_subcommand("run", "Run a case");
   run->add_option("CASE.toml", a.file, "the case file")->required();
@@ -73,9 +83,22 @@ void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
   pack->add_option("SPEC.toml", a.pack.spec, "the specification")->required();
   pack->add_option("-o", a.pack.out, "the grain table to write")->required();
   pack->callback([&] { command = [&a] { return command_pack(a.pack); }; });
+
+  CLI::App* init = app.add_subcommand("init", "Write a commented first case");
+  init->add_option("CASE.toml", a.file, "the file to write; default: first.toml");
+  init->callback([&] { command = [&a] { return command_init(a.file.empty() ? "first.toml" : a.file); }; });
+
+  CLI::App* keys = app.add_subcommand("keys", "Explain the keys of a case file");
+  keys->add_option("PATTERN", a.pattern, "a part of a key, or a word of its explanation; default: list all keys");
+  keys->callback([&] { command = [&a] { return command_keys(a.pattern); }; });
+
+  // become_tool has started these; here they are for the help.
+  for (const Tool& tool : tools()) app.add_subcommand(tool.name, tool.purpose);
 }
 
 int dispatch(int argc, char** argv) {
+  if (const std::string reason = program_disagreement(MPI_COMM_WORLD); !reason.empty())
+    return on_first_rank([&] { throw InputError(reason); });
   CLI::App app("Cairn: Material Point Method for many bodies in frictional contact", "cairn");
   Arguments arguments;
   arguments.run.program = argv[0];
@@ -96,12 +119,27 @@ int dispatch(int argc, char** argv) {
 }
 
 }  // namespace
+
+std::string version_text() {
+  const ProgramFacts& f = program_facts();
+  std::string text = "cairn " + f.version;
+  for (const auto& [name, value] : {std::pair("commit", &f.commit),
+                                    {"compiler", &f.compiler},
+                                    {"MPI", &f.mpi},
+                                    {"HDF5", &f.hdf5},
+                                    {"METIS", &f.metis},
+                                    {"instruction set", &f.instruction_set}})
+    text += fmt::format("\n{:<15}  {}", name, *value);
+  return text;
+}
+
 }  // namespace cairn::app
 
 int main(int argc, char** argv) {
   // A file at its size limit and a reader that went away are errors of the call that writes, not the program's end.
   std::signal(SIGXFSZ, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
+  cairn::app::become_tool(argc, argv);
   MPI_Init(&argc, &argv);
   cairn::app::prepare_for_failures();
   int code = cairn::app::done;

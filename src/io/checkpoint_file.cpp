@@ -25,6 +25,7 @@ CheckpointWriter::CheckpointWriter(std::filesystem::path file, MPI_Comm comm, st
                                    double time, std::int64_t step)
     : state_(new State{{std::move(file), comm, bytes}, comm}) {
   state_->writer.add_attribute("/", "kind", std::string(checkpoint_kind));
+  state_->writer.add_program();
   add("format", format_version);
   add("rows", rows);
   add("time", time);

@@ -247,6 +247,9 @@ std::string describe_header(const std::filesystem::path& file, hid_t root) {
   if (hdf5::read_attribute(root, "step", step)) facts += fmt::format("{}step {}", facts.empty() ? "" : ", ", step);
   if (hdf5::read_attribute(root, "rows", rows)) facts += fmt::format("{}{} rows", facts.empty() ? "" : ", ", rows);
   if (!facts.empty()) text += facts + "\n";
+  std::string version, commit;
+  if (hdf5::read_attribute(root, "version", version) && hdf5::read_attribute(root, "commit", commit))
+    text += fmt::format("written by cairn {}, commit {}\n", version, commit);
   return kind == "checkpoint" ? text + describe_checkpoint(root) : text;
 }
 

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "cairn/io/result_files.hpp"
+#include "cairn/io/run_record.hpp"
 #include "posix_file.hpp"
 
 namespace cairn {
@@ -32,6 +33,7 @@ bool is_table(std::string_view head) {
 /// True where the head of a file says that this program wrote it as the result of that name.
 bool is_marked(const std::string& name, std::string_view head) {
   if (name == "case.toml") return head.starts_with(case_mark);
+  if (name == record_file) return head.starts_with(record_mark);
   if (name.starts_with("case_grains_")) return head.starts_with(table_mark);
   if (name == "history.csv") return head.starts_with("step,time,dt,");
   if (name == "bodies.csv") return head.starts_with("step,time,body,");

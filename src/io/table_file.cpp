@@ -48,6 +48,7 @@ void write_column(TableWriter& writer, const std::string& path, const RowBlocks&
 
 void write_header(TableWriter& writer, const std::string& kind, const RowBlocks& rows, double time, std::int64_t step) {
   writer.add_attribute("/", "kind", kind);
+  writer.add_program();
   writer.add_attribute("/", "rows", rows.total_rows);
   writer.add_attribute("/", "time", time);
   writer.add_attribute("/", "step", step);

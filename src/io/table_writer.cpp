@@ -11,6 +11,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
+#include "cairn/io/program_facts.hpp"
 #include "seal.hpp"
 
 namespace cairn {
@@ -193,6 +194,11 @@ void TableWriter::add_attribute(const std::string& object, const std::string& na
     const Handle owner(H5Oopen(handle_, object.c_str(), H5P_DEFAULT), H5Oclose);
     return owner.valid() && hdf5::write_attribute(owner, name, value);
   });
+}
+
+void TableWriter::add_program() {
+  add_attribute("/", "version", program_facts().version);
+  add_attribute("/", "commit", program_facts().commit);
 }
 
 std::int64_t TableWriter::lay_out(const std::string& path, int components, std::int64_t total_rows, hid_t type) {

@@ -47,6 +47,8 @@ class TableWriter {
 
   void add_group(const std::string& path);
   void add_link(const std::string& path, const std::string& target);
+  /// The version and commit of this program, at the root.
+  void add_program();
   void add_attribute(const std::string& object, const std::string& name, const hdf5::AttributeValue& value);
 
   /// Writes a dataset of rows.total_rows (x components) values, each rank its own rows.

@@ -191,6 +191,7 @@ class Run {
       if (error.empty()) error = write_case_files(case_, settings_.out);
       if (error.empty()) tables_.open(from ? &from->state() : nullptr);
       if (error.empty()) error = tables_.error();
+      if (error.empty() && settings_.record) error = settings_.record->begin(goes_on, steps_before_);
     }
     throw_together(comm_, error);
     MPI_Bcast(&goes_on, 1, MPI_CXX_BOOL, 0, comm_);

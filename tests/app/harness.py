@@ -46,11 +46,12 @@ class Program:
             print("mpirun was not found")
             sys.exit(SKIP)
         for key, value in (("OMPI_ALLOW_RUN_AS_ROOT", "1"), ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
-                           ("OMPI_MCA_mpi_yield_when_idle", "1"), ("OMPI_MCA_btl_vader_single_copy_mechanism", "none")):
+                           ("OMPI_MCA_mpi_yield_when_idle", "1"), ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+                           ("OMPI_MCA_btl_vader_single_copy_mechanism", "none")):
             os.environ.setdefault(key, value)
 
     def command(self, *arguments, ranks: int = 1) -> list[str]:
-        launcher = [] if ranks == 1 else [self.mpirun, "--oversubscribe", "-n", str(ranks)]
+        launcher = [] if ranks == 1 else [self.mpirun, "-n", str(ranks)]
         return launcher + [self.exe, *map(str, arguments)]
 
     def __call__(self, *arguments, ranks: int = 1, cwd: Path | None = None, timeout: float = 120, **options) -> Done:

@@ -52,7 +52,7 @@ def test_version_and_help(cairn: Program, here: Path):
         lines = done.out.splitlines()
         expect(re.fullmatch(r"cairn \d+\.\d+\.\d+", lines[0]), done.out)
         fields = dict(re.split(r"  +", line, maxsplit=1) for line in lines[1:])
-        expect(list(fields) == ["compiler", "MPI", "HDF5", "METIS", "instruction set"], done.out)
+        expect(list(fields) == ["commit", "compiler", "MPI", "HDF5", "METIS", "instruction set"], done.out)
         expect(all(fields.values()) and re.fullmatch(r"\d+\.\d+\.\d+", fields["HDF5"]), done.out)
     done = cairn("--help", cwd=here)
     expect_code(done, 0)
@@ -161,7 +161,7 @@ def test_overwrite(cairn: Program, here: Path):
         (out / "grains_000077.h5").write_bytes(earlier)
         plain = {"output.particles": "{}", "output.track": "[]"}
         expect_code(cairn(*run, *few, "--overwrite", *sets(plain), ranks=ranks, cwd=here), 0)
-        expect(names(out) == ["case.toml", "history.csv", "notes.txt"], names(out))
+        expect(names(out) == ["case.toml", "history.csv", "notes.txt", "run.json"], names(out))
     expect((out / "notes.txt").read_text() == "mine\n", "a file that is no result was changed")
 
 

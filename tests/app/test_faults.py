@@ -183,7 +183,7 @@ def mixed(cairn: Program, arguments: list, ranks: int, odd: int, prepare: str) -
     """Runs the program with one rank, number `odd`, started by a shell that has done something before."""
     words = [cairn.exe, *map(str, arguments)]
     shell = ["/bin/sh", "-c", f'{prepare}; exec "$@"', "sh", *words]
-    command = [cairn.mpirun, "--oversubscribe"]
+    command = [cairn.mpirun]
     for rank in range(ranks):
         command += [":"] * (rank > 0) + ["-n", "1", *(shell if rank == odd else words)]
     try:

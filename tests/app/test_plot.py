@@ -329,8 +329,9 @@ def last_line_cut(scratch: Path):
 def failed(cairn: Program, scratch: Path):
     """The pictures of a run that failed say so, and those of one that went on from there do not."""
     case, out = ROOT / "cases" / "two_disks.toml", scratch / "failed"
-    few = {"time.steps": 30, "output.history": "{ every = 1 }", "output.particles": "{ every = 10 }"}
-    done = cairn("run", case, "--out", out, *sets(few | {"solver.energy_limit": 1e-9}))
+    few = {"time.steps": 30, "output.history": "{ every = 1 }", "output.particles": "{ every = 10 }",
+           "bodies.0.angular_velocity": 5.0}
+    done = cairn("run", case, "--out", out, *sets(few | {"solver.energy_limit": 1e-15}))
     assert done.code == 3, f"exit code {done.code} {done.err}"
     assert "THE RUN FAILED" in plot(out)
     summary = json.loads((out / "pictures" / "summary.json").read_text())

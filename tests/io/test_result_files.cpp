@@ -9,15 +9,23 @@
 #include "cairn/io/folder_lock.hpp"
 #include "cairn/io/own_files.hpp"
 #include "cairn/io/result_files.hpp"
+#include "cairn/io/run_record.hpp"
 
 namespace cairn {
 namespace {
 
 namespace fs = std::filesystem;
 
-const std::set<std::string> results = {"bodies.csv",           "checkpoint_000020.h5",     "contacts_000001.h5",
-                                       "grains_1234567.h5",    "failure_particles.vtkhdf", "history.csv",
-                                       "particles.hdf.series", "particles_000.vtkhdf",     "particles_000012.vtkhdf"};
+const std::set<std::string> results = {"bodies.csv",
+                                       "checkpoint_000020.h5",
+                                       "contacts_000001.h5",
+                                       "grains_1234567.h5",
+                                       "failure_particles.vtkhdf",
+                                       "history.csv",
+                                       "particles.hdf.series",
+                                       "particles_000.vtkhdf",
+                                       "particles_000012.vtkhdf",
+                                       "run.json"};
 const std::set<std::string> others = {"case.toml",       "notes.txt",           "history.csv.bak",
                                       "my_history.csv",  "particles_.vtkhdf",   "particles_a.vtkhdf",
                                       "grains_01.csv",   "checkpoint_1.h5.old", "summary.json",
@@ -27,6 +35,7 @@ const std::set<std::string> others = {"case.toml",       "notes.txt",           
 std::string content_of(const std::string& name) {
   if (name == "history.csv") return "step,time,dt,kinetic_energy\n0,0,0,0\n";
   if (name == "bodies.csv") return "step,time,body,x,y\n";
+  if (name == "run.json") return record_mark;
   if (name.ends_with(".series")) return "{\n  \"file-series-version\": \"1.0\",\n  \"files\": [\n  ]\n}\n";
   return std::string("\x89HDF\r\n\x1a\n") + std::string(100, 'x') + std::string("kind\0", 5);
 }

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -9,6 +10,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/info.hpp"
+#include "cairn/io/program_facts.hpp"
 #include "cairn/io/table_file.hpp"
 
 namespace {
@@ -171,7 +173,9 @@ TEST_F(TableFile, DescriptionSaysWhatIsThere) {
   write_vtkhdf(folder_ / "p.vtkhdf", MPI_COMM_SELF, {{{0, 3}}, 3}, columns(), 0.5, 3);
   const std::string text = describe_file(folder_ / "p.vtkhdf");
   EXPECT_EQ(text.substr(0, text.find("  dataset")),
-            "p.vtkhdf: material points (VTKHDF: opens in ParaView)\ntime 0.5 s, step 3, 3 rows\n");
+            fmt::format("p.vtkhdf: material points (VTKHDF: opens in ParaView)\ntime 0.5 s, step 3, 3 rows\n"
+                        "written by cairn {}, commit {}\n",
+                        program_facts().version, program_facts().commit));
   for (const char* part : {"position [m]", "3 x 3", "-3 .. 5", "stress [Pa]", "3 x 6", "1 .. 1e+09", "int32", "4 .. 7"})
     EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
   EXPECT_EQ(text.find("Offsets"), std::string::npos);

@@ -11,6 +11,8 @@ namespace cairn {
 
 /// The points at the moment of a failure.
 inline constexpr const char* failure_file = "failure_particles.vtkhdf";
+/// Which program wrote the results, and when.
+inline constexpr const char* record_file = "run.json";
 
 /// True for the names of result files: history.csv, bodies.csv, particles_N.vtkhdf, grains_N.h5, contacts_N.h5 and
 /// checkpoint_N.h5 with N a number, particles.hdf.series and failure_particles.vtkhdf. What a run reads again,

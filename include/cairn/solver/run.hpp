@@ -5,17 +5,19 @@
 #include <string>
 
 #include "cairn/io/case.hpp"
+#include "cairn/io/run_record.hpp"
 #include "cairn/parallel/communicator.hpp"
 
 namespace cairn {
 
 struct RunSettings {
-  std::filesystem::path out;   // folder of the results; exists
-  std::string restart;         // empty: from the start; "latest": the last checkpoint in `out`; else a checkpoint file
-  bool profile = false;        // report where the time went
-  bool allow_changes = false;  // go on from a checkpoint of a case that differs
-  std::string command;         // of this run without --restart, for the message that says how to resume
-  bool overwrite = false;      // remove the results of an earlier run from `out`, once the case has been set up
+  std::filesystem::path out;    // folder of the results; exists
+  std::string restart;          // empty: from the start; "latest": the last checkpoint in `out`; else a checkpoint file
+  bool profile = false;         // report where the time went
+  bool allow_changes = false;   // go on from a checkpoint of a case that differs
+  std::string command;          // of this run without --restart, for the message that says how to resume
+  RunRecord* record = nullptr;  // where it is kept, of rank 0
+  bool overwrite = false;       // remove the results of an earlier run from `out`, once the case has been set up
 };
 
 /// Runs the case. Collective. Returns the exit code: 0 done, 4 stopped by a signal after a checkpoint.
