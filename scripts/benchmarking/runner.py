@@ -114,7 +114,11 @@ def machine() -> dict[str, object]:
     """What the numbers were measured on."""
     model, memory = "unknown", 0
     try:
-        model = re.search(r"model name\s*:\s*(.*)", Path("/proc/cpuinfo").read_text())[1]
+        text = Path("/proc/cpuinfo").read_text()
+        model = re.search(r"model name\s*:\s*(.*)", text)[1]
+        # Virtual machines hide the name; family and model still tell the generation.
+        numbers = [re.search(rf"^{key}\s*:\s*(\d+)", text, re.MULTILINE)[1] for key in ("cpu family", "model")]
+        model += f" (family {numbers[0]}, model {numbers[1]})"
         memory = int(re.search(r"MemTotal:\s*(\d+)", Path("/proc/meminfo").read_text())[1]) * 1024
     except (OSError, TypeError):
         pass

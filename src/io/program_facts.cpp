@@ -86,11 +86,10 @@ const ProgramFacts& program_facts() {
   return facts;
 }
 
-std::string program_disagreement(MPI_Comm comm) {
+std::string program_disagreement(MPI_Comm comm, const ProgramFacts& facts) {
   constexpr std::size_t width = 256;
   int ranks = 1, length = 0;
   MPI_Comm_size(comm, &ranks);
-  const ProgramFacts& facts = program_facts();
   std::array<char, MPI_MAX_PROCESSOR_NAME> host{};
   MPI_Get_processor_name(host.data(), &length);
   struct Rank {

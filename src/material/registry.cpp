@@ -16,8 +16,9 @@ struct Table<std::variant<Laws...>> {
   /// Types that share a name differ in their number of state variables alone, and count once.
   static std::vector<LawInfo> infos() {
     std::vector<LawInfo> all = {{Laws::name, Laws::parameters, HasPlaneStress<Laws>, HasPressure<Laws>}...};
-    const auto rest = std::ranges::unique(all, {}, &LawInfo::name);
-    all.erase(rest.begin(), rest.end());
+    // std::ranges::unique does not compile with Clang 14 and the library of GCC 12.
+    const auto same = [](const LawInfo& a, const LawInfo& b) { return a.name == b.name; };
+    all.erase(std::unique(all.begin(), all.end(), same), all.end());
     return all;
   }
 

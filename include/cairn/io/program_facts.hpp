@@ -19,6 +19,6 @@ const ProgramFacts& program_facts();
 
 /// What keeps the ranks from giving one result: programs of other versions or instruction sets, by machine. Empty where
 /// they agree. The same on every rank. Collective.
-std::string program_disagreement(MPI_Comm comm);
+std::string program_disagreement(MPI_Comm comm, const ProgramFacts& facts = program_facts());
 
 }  // namespace cairn
