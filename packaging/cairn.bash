@@ -9,7 +9,7 @@ _cairn() {
   fi
   case $before in
     --set)
-      mapfile -t COMPREPLY < <(compgen -W "$(cairn keys 2>/dev/null | tr ', ' '\n\n' | grep -F .)" -S = -- "$word")
+      mapfile -t COMPREPLY < <(compgen -W "$(cairn keys 2>/dev/null | tr -s ', ' '\n' | grep -F .)" -S = -- "$word")
       compopt -o nospace
       return ;;
     --restart) mapfile -t COMPREPLY < <(compgen -W latest -- "$word") ;;

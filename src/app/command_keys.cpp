@@ -24,7 +24,7 @@ struct Entry {
 
 std::string trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(' ');
-  if (first == text.npos) return {};
+  if (first == std::string_view::npos) return {};
   return std::string(text.substr(first, text.find_last_not_of(' ') - first + 1));
 }
 
@@ -42,7 +42,7 @@ std::string lower(std::string text) {
 std::vector<std::string> cells_of(std::string_view line) {
   std::vector<std::string> cells;
   line.remove_prefix(1);
-  for (std::size_t end; (end = line.find('|')) != line.npos; line.remove_prefix(end + 1))
+  for (std::size_t end; (end = line.find('|')) != std::string_view::npos; line.remove_prefix(end + 1))
     cells.push_back(trimmed(line.substr(0, end)));
   return cells;
 }
@@ -50,7 +50,7 @@ std::vector<std::string> cells_of(std::string_view line) {
 /// "## [domain]" to "domain.", "## [[bodies]]" to "bodies.N."; empty for a heading that names no section.
 std::string section_of(std::string_view heading) {
   const auto begin = heading.find('['), end = heading.find(']');
-  if (begin == heading.npos) return {};
+  if (begin == std::string_view::npos) return {};
   const bool array = heading.substr(begin).starts_with("[[");
   const auto at = begin + (array ? 2 : 1);
   return std::string(heading.substr(at, end - at)) + (array ? ".N." : ".");
@@ -70,7 +70,7 @@ std::string prefix_of(const std::string& first_column, const std::string& sectio
 Entry entry_of(const std::vector<std::string>& head, const std::vector<std::string>& row, const std::string& section) {
   const std::string prefix = prefix_of(plain(head[0]), section);
   Entry entry;
-  for (std::string_view rest = row[0]; rest.find('`') != rest.npos;) {
+  for (std::string_view rest = row[0]; rest.find('`') != std::string_view::npos;) {
     rest.remove_prefix(rest.find('`') + 1);
     const auto end = rest.find('`');
     entry.key += fmt::format("{}{}{}", entry.key.empty() ? "" : ", ", prefix, rest.substr(0, end));

@@ -65,7 +65,8 @@ std::string command_line(const RunArguments& arguments, const fs::path& out) {
   std::string text = ranks > 1 ? fmt::format("mpirun -n {} ", ranks) : "";
   text += fmt::format("{} run {} --out {} ", quoted(arguments.program), quoted(arguments.file.string()),
                       quoted(out.string()));
-  for (const auto& [key, value] : arguments.overrides) text += fmt::format("--set {} ", quoted(key + "=" + value));
+  for (const auto& [key, value] : arguments.overrides)
+    text += fmt::format("--set {} ", quoted(fmt::format("{}={}", key, value)));
   return text;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 
 #include "cairn/body/cut_sites.hpp"
@@ -163,11 +164,16 @@ Box<3> cells_of(const Bounds& b, const Domain& d) {
   return cells;
 }
 
-/// Whether a run would place a point in a shape that is moved by `shift`: one of the regular sites of the cells lies
-/// inside. Looks at `sites` places at the most and takes the rest for granted: the set-up of a run counts them all.
+int points_per_side(const Case& c) {
+  return static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / c.domain.dimension)));
+}
+
+/// Whether a run would place a whole point in a shape that is moved by `shift`: one of the regular sites of the cells
+/// lies inside. Looks at `sites` places at the most and takes the rest for granted: the set-up of a run counts them
+/// all.
 bool holds_site(const Shape& shape, const Vec3& shift, const Case& c, std::int64_t& sites) {
   const Domain& d = c.domain;
-  const int per = static_cast<int>(std::lround(std::pow(c.solver.points_per_cell, 1.0 / d.dimension)));
+  const int per = points_per_side(c);
   Vec3 spacing = Vec3::Zero();
   for (int k = 0; k < d.dimension; ++k) spacing[k] = (d.upper[k] - d.lower[k]) / d.cells[k];
   const auto inside = [&](const std::array<std::int64_t, 3>& site) {
@@ -194,6 +200,58 @@ bool holds_site(const Shape& shape, const Vec3& shift, const Case& c, std::int64
   return false;
 }
 
+/// The same for a shape whose surface is cut: one of the sites holds a point.
+template <int Dim>
+bool holds_cut_site(const Shape& shape, const Vec3& shift, const Case& c, int per, std::int64_t& sites) {
+  constexpr int side = 8;  // of the blocks of sites that are looked at together
+  const Domain& d = c.domain;
+  Vec3 origin = Vec3::Zero(), spacing = Vec3::Zero();
+  Bounds b = bounds(shape);
+  b.lower += shift, b.upper += shift;
+  const Box<3> cells = cells_of(b, d);
+  if (cells.empty()) return false;
+  Box<Dim> all, blocks;
+  for (int k = 0; k < Dim; ++k) {
+    origin[k] = d.lower[k] - shift[k], spacing[k] = (d.upper[k] - d.lower[k]) / d.cells[k] / per;
+    all.lower[k] = cells.lower[k] * per, all.upper[k] = cells.upper[k] * per;
+    blocks.upper[k] = (all.upper[k] - all.lower[k] + side - 1) / side;
+  }
+  const auto holds = [&](const Box<Dim>& some) {
+    const CutSites<Dim> cut(shape, origin, spacing, some);
+    bool found = false;
+    for_each(some, [&](const Index<Dim>& site) { found = found || cut.at(site).share > 0; });
+    return found;
+  };
+  Box<Dim> near;  // the site next to the centre
+  for (int k = 0; k < Dim; ++k) {
+    const double scaled = std::floor((centre(shape)[k] - origin[k]) / spacing[k]);
+    near.lower[k] = static_cast<int>(std::clamp(scaled, double(all.lower[k]), double(all.upper[k] - 1)));
+    near.upper[k] = near.lower[k] + 1;
+  }
+  bool found = holds(near);
+  for_each(blocks, [&](const Index<Dim>& block) {
+    if (found) return;
+    Box<Dim> some;
+    for (int k = 0; k < Dim; ++k) {
+      some.lower[k] = all.lower[k] + block[k] * side;
+      some.upper[k] = std::min(some.lower[k] + side, all.upper[k]);
+    }
+    sites -= static_cast<std::int64_t>(some.size());
+    found = sites < 0 || holds(some);
+  });
+  return found;
+}
+
+/// Whether a run would place a point in a shape that is moved by `shift`.
+bool holds_point(const Shape& shape, const Vec3& shift, const Case& c, std::int64_t& sites) {
+  const int dim = c.domain.dimension, per = points_per_side(c);
+  double smallest = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < dim; ++k)
+    smallest = std::min(smallest, (c.domain.upper[k] - c.domain.lower[k]) / c.domain.cells[k]);
+  if (c.solver.surface != Surface::cut || !can_be_cut(shape, smallest, per)) return holds_site(shape, shift, c, sites);
+  return dim == 2 ? holds_cut_site<2>(shape, shift, c, per, sites) : holds_cut_site<3>(shape, shift, c, per, sites);
+}
+
 }  // namespace
 
 bool is_prescribed(const Case& c, int index) {
@@ -208,7 +266,6 @@ void check_points(const Case& c, Errors& errors) {
   const std::size_t before = errors.count();
   for (std::size_t i = 0; i < c.bodies.size() && errors.count() < before + most_reported; ++i) {
     const Shape& shape = c.bodies[i].shape;
-    if (c.solver.surface == Surface::cut && is_round(shape)) continue;  // has points of any size
     std::int64_t sites = 10'000'000;
     bool found = false;
     for (int image = 0; image < 27 && !found; ++image) {
@@ -219,7 +276,7 @@ void check_points(const Case& c, Errors& errors) {
         reached = reached && (turns == 0 || d.periodic[k]);
         shift[k] = turns * (d.upper[k] - d.lower[k]);
       }
-      found = reached && holds_site(shape, shift, c, sites);
+      found = reached && holds_point(shape, shift, c, sites);
     }
     if (!found)
       errors.add({c.bodies[i].source, 0}, "",

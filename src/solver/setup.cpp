@@ -201,10 +201,9 @@ class Filler {
     return false;
   }
 
-  /// Whether points at the shape's surface are cut; what is thinner than two points would lose them.
+  /// Whether points at the shape's surface are cut.
   bool is_cut(const Shape& shape) const {
-    return case_.solver.surface == Surface::cut && is_round(shape) &&
-           smallest_width(shape) * per_direction_ >= 2 * lattice_.smallest_spacing();
+    return case_.solver.surface == Surface::cut && can_be_cut(shape, lattice_.smallest_spacing(), per_direction_);
   }
 
   Index<Dim> site_of(const Index<Dim>& cell, const Index<Dim>& sub) const {

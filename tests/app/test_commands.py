@@ -175,6 +175,40 @@ def test_keys(cairn: Program, here: Path):
     expect_code(cairn("keys", "no such thing"), 2, "no key")
 
 
+TINY = {"disk_on_a_point": "type = 'disk', centre = [0.5125, 0.5125], radius = 0.004",
+        "disk_between_points": "type = 'disk', centre = [0.5, 0.5], radius = 0.004",
+        "small_disk": "type = 'disk', centre = [0.5, 0.5], radius = 0.03",
+        "disk_beyond_a_corner": "type = 'disk', centre = [1.06, 1.06], radius = 0.086",
+        "disk_past_a_face": "type = 'disk', centre = [1.095, 0.5], radius = 0.1",
+        "plate": "type = 'box', lower = [0.2, 0.505], upper = [0.8, 0.510]",
+        "plate_on_points": "type = 'box', lower = [0.2, 0.511], upper = [0.8, 0.515]",
+        "thin_ellipse": "type = 'ellipse', centre = [0.5, 0.5], radii = [0.3, 0.004], angle = 0.5",
+        "flat_ellipse": "type = 'ellipse', centre = [0.5, 0.5], radii = [0.3, 0.004]",
+        "lens": "type = 'intersection', of = [{ type = 'disk', centre = [0.3, 0.5], radius = 0.2 }, "
+                "{ type = 'disk', centre = [0.697, 0.5], radius = 0.2 }]",
+        "thick_lens": "type = 'intersection', of = [{ type = 'disk', centre = [0.3, 0.5], radius = 0.2 }, "
+                      "{ type = 'disk', centre = [0.62, 0.5], radius = 0.2 }]",
+        "thin_ring": "type = 'difference', of = [{ type = 'disk', centre = [0.5, 0.5], radius = 0.2 }, "
+                     "{ type = 'disk', centre = [0.5, 0.5], radius = 0.1999 }]"}
+
+
+def test_check_refuses(cairn: Program, here: Path):
+    """`check` says of bodies that may be too small for a point what `run` says."""
+    case = (ROOT / "cases" / "two_disks.toml").read_text()
+    shape = re.search(r"^shape = \{ (.*) \}$", case, re.MULTILINE)[1]
+    outcomes = []
+    for surface in ("cut", "whole"):
+        for name, small in TINY.items():
+            (here / "case.toml").write_text(case.replace(shape, small, 1))
+            more = sets({"domain.cells": "[20, 20]", "solver.surface": surface, "time.steps": 1, "solver.shape": "linear"})
+            checked = cairn("check", "case.toml", *more, cwd=here)
+            ran = cairn("run", "case.toml", "--out", f"{surface}_{name}", *more, cwd=here)
+            expect(checked.code == ran.code, f"{name}, {surface}: check {checked.code}, run {ran.code}: {ran.err}")
+            expect(checked.code in (0, 2) and (checked.code == 0 or "holds no material point" in checked.err), checked.err)
+            outcomes.append(checked.code)
+    expect(min(outcomes.count(0), outcomes.count(2)) >= 5, f"one-sided: {outcomes}")
+
+
 def test_scripts(cairn: Program, here: Path):
     """The scripts as commands of the program; their exit codes are passed on."""
     for name, code in (("plot", 2), ("compare-runs", 1), ("convert-grains", 2)):

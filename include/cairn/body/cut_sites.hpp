@@ -17,6 +17,12 @@ struct PointSite {
 /// True for balls, ellipsoids and compounds of them: shapes without flat faces.
 bool is_round(const Shape& shape);
 
+/// Whether the surface of a shape is cut where that is asked for, with `per_direction` points along the smallest side
+/// of a cell [m]: what is thinner than two points would lose them.
+inline bool can_be_cut(const Shape& shape, double smallest_cell, int per_direction) {
+  return is_round(shape) && smallest_width(shape) * per_direction >= 2 * smallest_cell;
+}
+
 /// The points of a shape on a lattice of sites, each the room of one whole point. A site of which at least half lies
 /// inside the shape holds a point; what lies inside any other goes, in equal parts, to those of its 2 Dim neighbours
 /// that hold one, or else of all its 3^Dim - 1. Volume and first moment of the shape are kept, to the accuracy of the
