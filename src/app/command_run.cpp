@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "cairn/core/error.hpp"
+#include "cairn/core/say.hpp"
 #include "cairn/io/case_folder.hpp"
 #include "cairn/io/folder_lock.hpp"
 #include "cairn/io/own_files.hpp"
@@ -108,7 +109,7 @@ int command_run(const RunArguments& arguments) {
     if (const std::string reason = check_targets(c, settings.out); !reason.empty())
       throw InputError("--out: " + reason);
     const ProgramFacts& facts = program_facts();
-    fmt::print("cairn {} ({}), {}\n", facts.version, facts.commit, facts.instruction_set);
+    say(stdout, "cairn {} ({}), {}\n", facts.version, facts.commit, facts.instruction_set);
     std::fflush(stdout);
   };
   int code = on_first_rank(prepare);

@@ -7,6 +7,8 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "cairn/core/say.hpp"
+
 namespace cairn {
 
 namespace {
@@ -56,17 +58,17 @@ void ProgressDisplay::show(const Progress& progress, double wall) {
   next_ = wall + (terminal_ ? terminal_interval : file_interval);
   const std::string line = format_progress(progress);
   if (terminal_) {
-    fmt::print(stream_, "\r{:<{}}", line, length_);  // blanks over what a longer line left
+    say(stream_, "\r{:<{}}", line, length_);  // blanks over what a longer line left
     length_ = line.size();
   } else {
-    fmt::print(stream_, "{}\n", line);
+    say(stream_, "{}\n", line);
   }
   std::fflush(stream_);
 }
 
 void ProgressDisplay::finish() {
   if (length_ == 0) return;
-  fmt::print(stream_, "\n");
+  say(stream_, "\n");
   std::fflush(stream_);
   length_ = 0;
 }

@@ -6,6 +6,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/core/printable.hpp"
+#include "cairn/core/say.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/case_changes.hpp"
 #include "cairn/io/result_files.hpp"
@@ -126,7 +127,7 @@ void print_restart(const Checkpoint& checkpoint, const std::vector<KeyChange>& c
   if (changes.size() > most_changes) text += fmt::format("  and {} more keys\n", changes.size() - most_changes);
   if (!fs::exists(out / "history.csv"))
     text += fmt::format("  {} holds no history.csv yet: it will begin after step {}\n", out.string(), step.steps);
-  fmt::print("{}", printable(text, true));
+  say(stdout, "{}", printable(text, true));
   std::fflush(stdout);
 }
 

@@ -6,6 +6,7 @@
 
 #include "cairn/core/error.hpp"
 #include "cairn/core/printable.hpp"
+#include "cairn/core/say.hpp"
 #include "cairn/io/agreement.hpp"
 #include "cairn/io/case_changes.hpp"
 #include "cairn/io/case_folder.hpp"
@@ -138,8 +139,8 @@ class Run {
 
   static void tell_departures(const Totals& t) {
     if (t.points_left + t.points_lost == 0) return;
-    fmt::print("left the domain: {:.0f} points; dropped: {:.0f} points; {:.6g} kg together\n", t.points_left,
-               t.points_lost, t.mass_left);
+    say(stdout, "left the domain: {:.0f} points; dropped: {:.0f} points; {:.6g} kg together\n", t.points_left,
+        t.points_lost, t.mass_left);
   }
 
   /// What this rank tells the others in a step.
@@ -174,8 +175,8 @@ class Run {
     const std::string reason = agreed.stop >= wall_limit_reached
                                    ? fmt::format("time.wall_limit = {} s", case_.time.wall_limit)
                                    : signal_name(static_cast<int>(agreed.stop));
-    fmt::print("stopped by {} at step {}, time {} s; the state is in {}\nresume with: {}--restart latest\n", reason,
-               simulation_.steps(), simulation_.time(), last_checkpoint_.string(), settings_.command);
+    say(stdout, "stopped by {} at step {}, time {} s; the state is in {}\nresume with: {}--restart latest\n", reason,
+        simulation_.steps(), simulation_.time(), last_checkpoint_.string(), settings_.command);
     std::fflush(stdout);
     return stopped;
   }
@@ -327,25 +328,25 @@ class Run {
     for (std::size_t s = 0; s + 1 < stage_names.size(); ++s)
       shares += fmt::format(" {} {:.1f} %", stage_names[s],
                             100 * simulation_.timers().seconds(static_cast<Stage>(s)) / std::max(total, 1e-30));
-    fmt::print("time of rank 0:{}\n", shares);
+    say(stdout, "time of rank 0:{}\n", shares);
     if (settings_.profile) {
       const double steps = std::max(1.0, steps_here());
-      fmt::print("sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
-      fmt::print("most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
+      say(stdout, "sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
+      say(stdout, "most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
       const double mean = std::max(1.0, static_cast<double>(points_now)) / ranks_;
-      fmt::print("balance: largest over mean points {:.3f}, patches moved {} times",
-                 static_cast<double>(most[2]) / mean, simulation_.times_balanced());
+      say(stdout, "balance: largest over mean points {:.3f}, patches moved {} times",
+          static_cast<double>(most[2]) / mean, simulation_.times_balanced());
       if (simulation_.times_balanced() > 0)
-        fmt::print(", in the time of {:.2g} steps each",
-                   simulation_.seconds_balancing() / simulation_.times_balanced() / (step_wall / steps));
-      fmt::print("\n");
+        say(stdout, ", in the time of {:.2g} steps each",
+            simulation_.seconds_balancing() / simulation_.times_balanced() / (step_wall / steps));
+      say(stdout, "\n");
     }
     RunSummary s;
     s.steps = simulation_.steps() - steps_before_, s.points = points_now, s.time = simulation_.time();
     s.wall = wall_clock() - start_, s.step_wall = step_wall;
     s.point_steps = static_cast<double>(s.steps) * static_cast<double>(s.points);
     s.energy_error = book_.error(), s.ranks = ranks_;
-    fmt::print("{}\n", format_summary(s));
+    say(stdout, "{}\n", format_summary(s));
   }
 
   const Case& case_;
