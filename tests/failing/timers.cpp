@@ -1,10 +1,13 @@
 // In the place of src/solver/timers.cpp: a program whose stages fail on one rank, as CAIRN_FAIL="RANK STAGE COUNT KIND"
 // says: at the COUNT-th time that the stage begins there, with an exception of that kind.
+// It says when.
 
 #include "cairn/solver/timers.hpp"
 
 #include <mpi.h>
 
+#include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <new>
 #include <sstream>
@@ -29,6 +32,9 @@ Plan read_plan() {
 
 [[noreturn]] void fail(const std::string& kind) {
   constexpr const char* text = "made to fail";
+  std::fprintf(
+      stderr, "failing at %.3f\n",
+      static_cast<double>(std::chrono::system_clock::now().time_since_epoch() / std::chrono::milliseconds(1)) / 1e3);
   if (kind == "RunError") throw RunError(text);
   if (kind == "InputError") throw InputError(text);
   if (kind == "bad_alloc") throw std::bad_alloc();

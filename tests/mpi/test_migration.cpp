@@ -211,7 +211,7 @@ TEST(Migration, PointsLeaveThroughOpenFacesAlone) {
         EXPECT_EQ(departing[0].lost.empty(), leaves);
         ++booked;
       };
-      world.migration = std::make_unique<Migration<2>>(*world.messages, world.owner, exits);
+      world.migration = std::make_unique<Migration<2>>(*world.messages, world.table, exits);
       bool here = false;
       world.for_pieces([&](auto& piece) {
         piece.points.column(0)[0] = lattice.lower()[0] + x * lattice.spacing()[0];
