@@ -76,7 +76,8 @@ Eigen::Map<Vec<Dim>> vector_of(AlignedDoubles& vectors, int node) {
   return Eigen::Map<Vec<Dim>>(vectors.data() + static_cast<std::size_t>(node) * vector_width);
 }
 
-/// Calls f(piece, node position, node offset, face) for every node with mass of a deformable piece on fixed faces.
+/// Calls f(piece, node position, node offset, number of the face) for every node with mass of a deformable piece on
+/// fixed faces.
 template <int Dim, class F>
 void for_fixed_nodes(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                      const std::vector<Body>& bodies, F&& f) {
@@ -87,7 +88,7 @@ void for_fixed_nodes(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceC
       for_each(at_face(box, d, side, plane), [&](const Index<Dim>& i) {
         const int node = box.offset(i);
         if (piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width] > 0)
-          f(piece, i, node, faces[2 * d + side]);
+          f(piece, i, node, 2 * d + side);
       });
     }
   });
@@ -122,36 +123,43 @@ void mirror_stress(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceCon
 template <int Dim>
 void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                         const std::vector<Body>& bodies, bool close_ledger) {
-  for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
-                       [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
-                         auto velocity = vector_of<Dim>(piece.nodes.velocity, node);
-                         if (close_ledger && lattice.owns_node(patch.id, place)) {
-                           const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
-                           const Vec<Dim> momentum = momentum_of(piece, node), change = mass * face.velocity - momentum;
-                           patch.ledger.contact_dissipation +=
-                               change.dot(face.velocity - 0.5 * (momentum / mass + velocity));
-                         }
-                         velocity = face.velocity;
-                       });
+  for_fixed_nodes<Dim>(
+      patch, lattice, faces, bodies, [&](Piece<Dim>& piece, const Index<Dim>& place, int node, int face) {
+        auto velocity = vector_of<Dim>(piece.nodes.velocity, node);
+        if (close_ledger) {
+          const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
+          const Vec<Dim> momentum = momentum_of(piece, node), given = faces[face].velocity;
+          patch.ledger.contact_dissipation += node_share<Dim>(patch.id, place, lattice, faces) *
+                                              (mass * given - momentum).dot(given - 0.5 * (momentum / mass + velocity));
+        }
+        velocity = faces[face].velocity;
+      });
 }
 
 template <int Dim>
 void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                      const std::vector<Body>& bodies, double dt, bool close_ledger) {
+                      const std::vector<Body>& bodies, double dt, bool close_ledger, bool keep_tools) {
   using M = NodeMotion<Dim>;
   for_fixed_nodes<Dim>(patch, lattice, faces, bodies,
-                       [&](Piece<Dim>& piece, const Index<Dim>& place, int node, const FaceCondition<Dim>& face) {
+                       [&](Piece<Dim>& piece, const Index<Dim>& place, int node, int face) {
                          const double mass = piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width];
                          double* motion = piece.nodes.motion.data() + static_cast<std::size_t>(node) * M::width;
                          Eigen::Map<Vec<Dim>> velocity(motion + M::velocity), acceleration(motion + M::acceleration);
-                         const Vec<Dim> before = momentum_of(piece, node) / mass;
-                         const Vec<Dim> impulse = mass * (face.velocity - velocity);
-                         velocity = face.velocity;
-                         acceleration = (face.velocity - before) / dt;
-                         if (!lattice.owns_node(patch.id, place)) return;
-                         patch.ledger.boundary_work += impulse.dot(face.velocity);
+                         const Vec<Dim> before = momentum_of(piece, node) / mass, given = faces[face].velocity;
+                         const double share = node_share<Dim>(patch.id, place, lattice, faces);
+                         const Vec<Dim> impulse = share * mass * (given - velocity);
+                         velocity = given;
+                         acceleration = (given - before) / dt;
+                         if (share == 0) return;
+                         const double work = impulse.dot(given);
+                         patch.ledger.boundary_work += work;
                          if (close_ledger)
-                           patch.ledger.contact_dissipation += 0.5 * mass * (face.velocity - before).squaredNorm();
+                           patch.ledger.contact_dissipation += 0.5 * share * mass * (given - before).squaredNorm();
+                         if (!keep_tools) return;
+                         Vec3 x = Vec3::Zero(), on_face = Vec3::Zero();
+                         for (int d = 0; d < Dim; ++d) x[d] = lattice.node_position(d, place[d]);
+                         on_face.head<Dim>() = -impulse;
+                         patch.tools[face].add(on_face, x, work);
                        });
 }
 
@@ -163,7 +171,7 @@ void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const Face
   template void constrain_velocity(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&, \
                                    const std::vector<Body>&, bool);                              \
   template void constrain_motion(Patch<Dim>&, const Lattice<Dim>&, const FaceConditions<Dim>&,   \
-                                 const std::vector<Body>&, double, bool);
+                                 const std::vector<Body>&, double, bool, bool);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

@@ -73,12 +73,8 @@ void ContactSweep<Dim>::list_nodes(const Patch<Dim>& patch, const Lattice<Dim>& 
     slot = -1;
     if (count < 2 && !(count == 1 && walled && at_face_of_type<Dim>(FaceType::wall, i, lattice, settings))) return;
     slot = static_cast<std::int32_t>(nodes_.size());
-    nodes_.push_back({total, count, 0, 0, 0, i, lattice.owns_node(patch.id, i) ? 1.0 : 0.0});
+    nodes_.push_back({total, count, 0, 0, 0, i, node_share<Dim>(patch.id, i, lattice, settings.faces)});
     total += count;
-    // On a symmetry plane sums hold both halves; beyond it they are the image of those inside.
-    for (int face = 0; face < 2 * Dim; ++face)
-      if (settings.faces[face].type == FaceType::symmetry && at_face<Dim>(i, face, lattice))
-        nodes_.back().share *= i[face / 2] == 0 || i[face / 2] == lattice.cells()[face / 2] ? 0.5 : 0.0;
   });
   entries_.assign(total, {});
 }
@@ -91,7 +87,8 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const ContactSetti
   for (std::size_t k = 0; k < patch.pieces.size(); ++k) {
     const auto& piece = patch.pieces[k];
     const Body& body = bodies[piece.body];
-    const bool turns = settings.chords && body.rigid && body.angular_velocity != Vec3::Zero();
+    const bool turns =
+        settings.chords && body.rigid && (body.angular_velocity != Vec3::Zero() || body.change != Vec3::Zero());
     if (turns) turning_.push_back(body);
     int node = 0;
     for_each_row(piece.nodes.box, box_, [&](int row, int n) {
@@ -102,7 +99,7 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const ContactSetti
         if (!(mass > 0)) continue;
         auto& entry = entries_[nodes_[place].first + filled[place]++];
         entry.piece = static_cast<int>(k), entry.node = node, entry.mass = mass;
-        entry.rigid = body.rigid, entry.material = body.material;
+        entry.rigid = body.rigid, entry.material = body.material, entry.tool = body.tool;
         if (turns) entry.turning = static_cast<int>(turning_.size()) - 1;
       }
     });

@@ -52,6 +52,7 @@ void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& latti
                                     const ContactSettings<Dim>& settings, double dt, bool last) {
   const bool only_first = settings.options.passes == Passes::before;
   patch.ledger.contact_nodes = 0;
+  for (auto& [tool, sum] : patch.tools) sum.last = {};
   for (const auto& node : nodes_) {
     load_node(node, patch, Pass::second, dt);
     if (!only_first) solve(node, patch, lattice, settings, dt, Pass::second);
@@ -75,6 +76,7 @@ void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& latti
     }
     patch.ledger.contact_nodes += touched && node.share > 0;
     if (node.share > 0 && settings.keep_contacts) keep_contacts(node, patch, lattice);
+    if (node.share > 0 && settings.keep_tools) keep_tools(node, patch, lattice);
     if (last) keep_ledger(node, patch, dt, false);
   }
 }
@@ -120,6 +122,22 @@ void ContactSweep<Dim>::keep_contacts(const Node& node, Patch<Dim>& patch, const
       sum[1 + Dim + d] += size * lattice.node_position(d, node.place[d]);
       sum[1 + 2 * Dim + d] += sign * size * pair.normal[d];
     }
+  }
+}
+
+/// Walls and rigid bodies take the opposite of what they give.
+template <int Dim>
+void ContactSweep<Dim>::keep_tools(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const {
+  const auto& partner = entries_[node.first + node.partner];
+  Vec3 x = Vec3::Zero(), impulse = Vec3::Zero();
+  for (int d = 0; d < Dim; ++d) x[d] = lattice.node_position(d, node.place[d]);
+  for (int p = node.first_pair; p < node.first_pair + node.pair_count; ++p) {
+    const NodePair<Dim>& pair = pairs_[p];
+    const bool wall = pair.face != pair.none;
+    if ((!wall && !partner.rigid) || pair.second.isZero(0)) continue;
+    const Vec<Dim> velocity = wall ? wall_velocities_[pair.face] : Vec<Dim>(partner.record.projected / partner.mass);
+    impulse.head<Dim>() = -node.share * pair.second;
+    patch.tools[wall ? pair.face : partner.tool].add(impulse, x, node.share * pair.second.dot(velocity));
   }
 }
 

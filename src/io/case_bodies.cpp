@@ -250,6 +250,43 @@ void read_grains(Table& root, Draft& draft, Errors& errors) {
   }
 }
 
+namespace {
+
+/// Spin in 2D is one number.
+MotionTable read_spin(Table& table, int dimension) {
+  MotionTable spin = table.motion("angular_velocity", dimension == 3 ? 3 : 1);
+  if (dimension == 2)
+    for (Vec3& w : spin.values) w = Vec3(0, 0, w.x());
+  return spin;
+}
+
+void read_piston(Table table, int dimension, StressUpdate update, Piston& piston) {
+  if (!table.present()) return;
+  if (update != StressUpdate::both && update != StressUpdate::modified_last)
+    table.error("",
+                "needs solver.stress_update = \"both\" or \"modified_last\": with others the force of a step is known "
+                "too late");
+  piston.mass = table.number("mass", std::nullopt, positive);
+  piston.along = table.vector("along", dimension, std::nullopt);
+  if (piston.along == Vec3::Zero()) table.error("along", "has no direction; it must not be zero");
+  piston.along.normalize();
+  if (!table.has("force")) table.missing("force", "is missing; give a number [N], or rows of time and force");
+  piston.force = table.motion("force", 1);
+  piston.force.repeat = table.boolean("repeat", false);
+  table.finish();
+}
+
+void read_motion(Table& table, int dimension, StressUpdate update, Drive& drive) {
+  drive.velocity = table.motion("velocity", dimension);
+  drive.angular_velocity = read_spin(table, dimension);
+  const bool repeat = table.boolean("repeat", false);
+  drive.velocity.repeat = repeat && drive.velocity.varies();
+  drive.angular_velocity.repeat = repeat && drive.angular_velocity.varies();
+  read_piston(table.table("piston"), dimension, update, drive.piston);
+}
+
+}  // namespace
+
 void read_drives(Table& root, Draft& draft) {
   for (Table& table : root.tables("drive")) {
     Drive drive;
@@ -259,8 +296,7 @@ void read_drives(Table& root, Draft& draft) {
       bodies.finish();
     }
     read_selection(table, draft, drive, given);
-    drive.velocity = table.vector("velocity", draft.result.domain.dimension, Vec3::Zero().eval());
-    drive.angular_velocity = read_angular_velocity(table, draft.result.domain.dimension);
+    read_motion(table, draft.result.domain.dimension, draft.result.solver.stress_update, drive);
     table.finish();
     if (given != 1)
       table.error("bodies", fmt::format("{} selections are given; give one of {{ overlapping = \"FACE\" }}, {{ ids = "

@@ -254,6 +254,35 @@ std::vector<Vec3> Table::vectors(std::string_view key, int size) {
   return result;
 }
 
+MotionTable Table::motion(std::string_view key, int size) {
+  const toml::node* node = find(key);
+  if (!node) return {};
+  const toml::array* array = node->as_array();
+  if (!array || array->empty() || !array->get(0)->is_array()) {
+    if (size > 1) return as_vector(*node, key, size, any_finite);
+    return Vec3(as_number(*node, key, any_finite).value_or(0.0), 0, 0);
+  }
+  MotionTable table;
+  table.values.clear();
+  for (const auto& entry : *array) {
+    const toml::array* row = entry.as_array();
+    if (!row || std::ssize(*row) != 1 + size) {
+      error(key, fmt::format("must have rows of {} numbers: a time and {}", 1 + size, size));
+      return {};
+    }
+    const double time = as_number(*row->get(0), key, any_finite).value_or(0.0);
+    if (!table.times.empty() && !(time > table.times.back())) {
+      error(key, fmt::format("has the time {} after {}; times must ascend", time, table.times.back()));
+      return {};
+    }
+    table.times.push_back(time);
+    Vec3 value = Vec3::Zero();
+    for (int i = 0; i < size; ++i) value[i] = as_number(*row->get(1 + i), key, any_finite).value_or(0.0);
+    table.values.push_back(value);
+  }
+  return table;
+}
+
 Vec3 Table::scalar_or_vector(std::string_view key, int size, const Range& range) {
   const toml::node* node = find(key);
   if (!node || node->is_array()) return vector(key, size, std::nullopt, range);

@@ -100,6 +100,9 @@ class Table {
   std::vector<Vec3> vectors(std::string_view key, int size);
   /// One number for each direction, or one for all.
   Vec3 scalar_or_vector(std::string_view key, int size, const Range& range);
+  /// Numbers [size], or one where size is 1; or an array of rows of a time [s] and so many numbers. Zero where it is
+  /// not given.
+  MotionTable motion(std::string_view key, int size);
   std::array<bool, 3> booleans(std::string_view key, int size);
   std::vector<int> integers(std::string_view key);
   std::vector<double> numbers(std::string_view key, const Range& range);

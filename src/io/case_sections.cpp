@@ -271,8 +271,10 @@ void read_output(Table output, const Draft& draft, Output& result) {
   result.checkpoint.keep = static_cast<int>(checkpoint.integer("keep", 2, 1, 1'000'000));
   checkpoint.finish();
   result.history.every = 10;
-  const std::pair<std::string_view, Schedule*> plain[] = {
-      {"grains", &result.grains}, {"contacts", &result.contacts}, {"history", &result.history}};
+  const std::pair<std::string_view, Schedule*> plain[] = {{"grains", &result.grains},
+                                                          {"contacts", &result.contacts},
+                                                          {"forces", &result.forces},
+                                                          {"history", &result.history}};
   for (const auto& [key, schedule] : plain) {
     Table table = output.table(key);
     read_schedule(table, *schedule);

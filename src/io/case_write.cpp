@@ -100,6 +100,27 @@ class Writer {
     vector("velocity", v);
     spin(w);
   }
+  /// The `size` components from `first` on, a number where it is one; with rows of times where they change.
+  std::string table_of(const MotionTable& table, int first, int size) const {
+    const auto row = [&](const Vec3& v) { return size == 1 ? text_of(v[first]) : list_of(v, size); };
+    if (!table.varies()) return row(table.values.front());
+    std::string rows;
+    for (std::size_t i = 0; i < table.times.size(); ++i) {
+      rows += fmt::format("{}[{}", i ? ", " : "", text_of(table.times[i]));
+      for (int k = first; k < first + size; ++k) rows += ", " + text_of(table.values[i][k]);
+      rows += "]";
+    }
+    return "[" + rows + "]";
+  }
+  void drive(const Drive& d) {
+    raw("velocity", table_of(d.velocity, 0, dim_));
+    raw("angular_velocity", table_of(d.angular_velocity, dim_ == 3 ? 0 : 2, dim_ == 3 ? 3 : 1));
+    if (d.velocity.repeat || d.angular_velocity.repeat) key("repeat", true);
+    if (d.piston.mass > 0)
+      raw("piston",
+          fmt::format("{{ mass = {}, along = {}, force = {}, repeat = {} }}", text_of(d.piston.mass),
+                      list_of(d.piston.along, dim_), table_of(d.piston.force, 0, 1), text_of(d.piston.force.repeat)));
+  }
   std::string take() { return std::move(text_); }
 
  private:
@@ -212,7 +233,7 @@ void write_bodies(Writer& out, const Draft& draft) {
     } else {
       out.raw("bodies", "{ ids = " + list_of(drive.ids, std::ssize(drive.ids)) + " }");
     }
-    out.motion(drive.velocity, drive.angular_velocity);
+    out.drive(drive);
   }
 }
 
@@ -252,6 +273,7 @@ void write_output(Writer& out, const Output& o) {
                  "fields = " + list_of(o.particles.fields, std::ssize(o.particles.fields)));
   write_schedule(out, "grains", o.grains);
   write_schedule(out, "contacts", o.contacts);
+  write_schedule(out, "forces", o.forces);
   write_schedule(out, "history", o.history);
   write_schedule(out, "checkpoint", o.checkpoint, "keep = " + text_of(o.checkpoint.keep));
   out.raw("track", list_of(o.track, std::ssize(o.track)));

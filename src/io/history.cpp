@@ -115,7 +115,7 @@ void CsvWriter::add_row(std::span<const CsvValue> values) {
   std::string line;
   for (const auto& value : values) {
     if (!line.empty()) line += ',';
-    std::visit([&](auto number) { fmt::format_to(std::back_inserter(line), "{}", number); }, value);
+    std::visit([&](const auto& number) { fmt::format_to(std::back_inserter(line), "{}", number); }, value);
   }
   append(line + '\n');
 }

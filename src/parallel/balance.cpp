@@ -26,6 +26,12 @@ template <int Dim>
 void put_patch(const Patch<Dim>& patch, Message& message) {
   message.put(patch.id);
   for (const auto& column : ledger_columns) message.put(patch.ledger.*column.value);
+  message.put(static_cast<std::int64_t>(patch.tools.size()));
+  for (const auto& [tool, sum] : patch.tools) {
+    message.put(std::int64_t{tool});
+    for (double value : sum.total) message.put(value);
+    for (double value : sum.last) message.put(value);
+  }
   message.put(static_cast<std::int64_t>(patch.contacts.size()));
   for (const auto& [pair, sum] : patch.contacts) {
     message.put(std::int64_t{pair.first}), message.put(std::int64_t{pair.second});
@@ -41,6 +47,11 @@ template <int Dim>
 Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim>& lattice) {
   Patch<Dim> patch(message.integer(at++), lattice);
   for (const auto& column : ledger_columns) patch.ledger.*column.value = *message.data(at++);
+  for (std::int64_t n = message.integer(at++); n > 0; --n) {
+    auto& sum = patch.tools[static_cast<int>(message.integer(at++))];
+    for (double& value : sum.total) value = *message.data(at++);
+    for (double& value : sum.last) value = *message.data(at++);
+  }
   for (std::int64_t n = message.integer(at++); n > 0; --n) {
     const int a = static_cast<int>(message.integer(at++)), b = static_cast<int>(message.integer(at++));
     auto& sum = patch.contacts[{a, b}];

@@ -43,16 +43,28 @@ std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm)
   return all;
 }
 
-std::vector<std::int64_t> gather_on_all(std::span<const std::int64_t> mine, MPI_Comm comm) {
+namespace {
+
+template <class T>
+std::vector<T> gather_all(std::span<const T> mine, MPI_Datatype type, MPI_Comm comm) {
   int ranks = 1;
   MPI_Comm_size(comm, &ranks);
   std::vector<int> counts(ranks), starts(ranks, 0);
   const int count = static_cast<int>(mine.size());
   MPI_Allgather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
   std::partial_sum(counts.begin(), counts.end() - 1, starts.begin() + 1);
-  std::vector<std::int64_t> all(starts.back() + counts.back());
-  MPI_Allgatherv(mine.data(), count, MPI_INT64_T, all.data(), counts.data(), starts.data(), MPI_INT64_T, comm);
+  std::vector<T> all(starts.back() + counts.back());
+  MPI_Allgatherv(mine.data(), count, type, all.data(), counts.data(), starts.data(), type, comm);
   return all;
+}
+
+}  // namespace
+
+std::vector<std::int64_t> gather_on_all(std::span<const std::int64_t> mine, MPI_Comm comm) {
+  return gather_all(mine, MPI_INT64_T, comm);
+}
+std::vector<double> gather_on_all(std::span<const double> mine, MPI_Comm comm) {
+  return gather_all(mine, MPI_DOUBLE, comm);
 }
 
 RollCall::RollCall(MPI_Comm comm) { MPI_Comm_dup(comm, &comm_); }

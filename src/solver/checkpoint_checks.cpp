@@ -74,6 +74,8 @@ std::string problem_of_series(const RunState& state) {
 std::string problem_of(const RunState& state) {
   if (!(state.step.time >= 0 && std::isfinite(state.step.time)) || state.step.steps < 0)
     return fmt::format("its step {} or time {} s is none that a run reaches", state.step.steps, state.step.time);
+  for (const double number : state.tools)
+    if (!std::isfinite(number)) return "the state of a tool is not finite";
   const std::string problem = problem_of_numbers(state);
   return problem.empty() ? problem_of_series(state) : problem;
 }
@@ -130,6 +132,7 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   add("time", state.step.time), add("step", state.step.steps);
   for_each_number(state, add);
   for (const auto& entry : state.series) add(entry.name, entry.time);
+  sum.add_values(std::span(state.tools));
   add("case", std::ssize(case_text));
   sum.add_values(std::span(case_text.data(), case_text.size()));
   return sum.value();

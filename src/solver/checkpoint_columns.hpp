@@ -47,9 +47,9 @@ using Counts = std::vector<std::int64_t>;
 
 /// The patches that a checkpoint holds: those of which something has to be remembered.
 struct Layout {
-  std::vector<PatchId> patches;     // ascending
-  Counts points, pieces, contacts;  // of each
-  std::vector<std::size_t> here;    // places in the list of those of this rank, ascending
+  std::vector<PatchId> patches;            // ascending
+  Counts points, pieces, contacts, tools;  // of each
+  std::vector<std::size_t> here;           // places in the list of those of this rank, ascending
 
   Counts one_each() const { return Counts(patches.size(), 1); }
   /// Rows of a table in patch order that belong to this rank's patches.

@@ -78,7 +78,7 @@ class ColumnReader {
 template <int Dim>
 void read_ledgers(ColumnReader<Dim>& in, const PatchList<Dim>& patches) {
   // The counts are known, and shown here to be what was written.
-  for (const char* name : {"patch_id", "patch_points", "patch_pieces", "patch_contacts"})
+  for (const char* name : {"patch_id", "patch_points", "patch_pieces", "patch_contacts", "patch_tools"})
     in.template read_patches<std::int64_t>(name);
   for (const auto& column : ledger_columns) {
     const auto values = in.template read_patches<double>(column.name);
@@ -147,6 +147,27 @@ void read_contacts(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const L
 }
 
 template <int Dim>
+void read_tools(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout, std::size_t tool_count) {
+  const auto numbers = in.template read<std::int32_t>("tool_number", 1, layout.tools);
+  const auto sums = in.template read<double>("tool_sums", ToolSum::size, layout.tools);
+  in.settle();
+  std::size_t row = 0;
+  for (std::size_t at = 0; at < patches.size(); ++at)
+    for (std::int64_t i = 0; i < layout.tools[layout.here[at]]; ++i, ++row) {
+      Patch<Dim>& patch = *patches[at];
+      const int tool = numbers[row];
+      in.require(tool >= 0 && tool < static_cast<int>(tool_count) &&
+                     (patch.tools.empty() || patch.tools.rbegin()->first < tool),
+                 fmt::format("the tools of patch {} are not in their order, or not those of the case", patch.id));
+      auto& total = patch.tools[tool].total;
+      std::copy_n(&sums[row * ToolSum::size], ToolSum::size, total.begin());
+      for (const double number : total)
+        in.require(std::isfinite(number), fmt::format("the sums of tool {} are not finite", tool));
+    }
+  in.settle();
+}
+
+template <int Dim>
 void read_points(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout, int states) {
   {
     const auto ids = in.template read<std::int64_t>("id", 1, layout.points);
@@ -205,6 +226,7 @@ RunState read_state(const CheckpointReader& reader) {
     }
   });
   state.step.time = reader.table().time(), state.step.steps = reader.table().step();
+  state.tools = reader.column<double>("tool_state", tool_state_size);
   const auto times = reader.column<double>("series_time");
   std::istringstream names(reader.text("series_names"));
   std::size_t listed = 0;
@@ -234,16 +256,19 @@ Checkpoint::Checkpoint(const std::filesystem::path& file, MPI_Comm comm)
       patches_(reader_.column<std::int64_t>("patch_id")),
       points_(reader_.column<std::int64_t>("patch_points")),
       pieces_(reader_.column<std::int64_t>("patch_pieces")),
-      contacts_(reader_.column<std::int64_t>("patch_contacts")) {
+      contacts_(reader_.column<std::int64_t>("patch_contacts")),
+      tools_(reader_.column<std::int64_t>("patch_tools")) {
   check_numbers(reader_, state_, case_text_);
   const std::size_t patches = patches_.size();
-  const bool consistent = points_.size() == patches && pieces_.size() == patches && contacts_.size() == patches;
+  const bool consistent =
+      points_.size() == patches && pieces_.size() == patches && contacts_.size() == patches && tools_.size() == patches;
   reader_.require(consistent ? "" : "damaged: the tables of patches do not fit together");
   const std::int64_t rows = reader_.rows_of("id");
   reader_.require(rows == reader_.table().rows() ? "" : "damaged: it has more or fewer points than it says");
   reader_.require(problem_of("patch_points", points_, rows));
   reader_.require(problem_of("patch_pieces", pieces_, reader_.rows_of("piece_body")));
   reader_.require(problem_of("patch_contacts", contacts_, reader_.rows_of("contact_bodies")));
+  reader_.require(problem_of("patch_tools", tools_, reader_.rows_of("tool_number")));
 }
 
 template <int Dim>
@@ -265,15 +290,16 @@ void Checkpoint::check_layout(const Lattice<Dim>& lattice) const {
 template <int Dim>
 void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
                       const std::vector<SolverMaterial>& materials) const {
-  Layout layout{patches_, points_, pieces_, contacts_, {}};
+  Layout layout{patches_, points_, pieces_, contacts_, tools_, {}};
   const PatchList<Dim> held = layout.find(patches);
   const int states = most_states(materials);
-  constexpr int columns_besides_quantities = 11 + static_cast<int>(std::size(ledger_columns));
+  constexpr int columns_besides_quantities = 14 + static_cast<int>(std::size(ledger_columns));
   const int columns = columns_besides_quantities + static_cast<int>(quantities<Dim>(states).size());
   ColumnReader<Dim> in(reader_, held, layout, columns);
   read_ledgers(in, held);
   read_pieces(in, held, layout, bodies, materials);
   read_contacts(in, held, layout, bodies.size());
+  read_tools(in, held, layout, state_.tools.size() / tool_state_size);
   read_points(in, held, layout, states);
   check_points(in, held, lattice);
 }

@@ -61,12 +61,12 @@ class ColumnWriter {
 template <int Dim>
 Layout layout_of(const Simulation<Dim>& simulation) {
   const PatchTable<Dim>& table = simulation.table();
-  enum { present, points, pieces, contacts, numbers };
+  enum { present, points, pieces, contacts, tools, numbers };
   Counts counts(table.size() * numbers, 0);
   for (const auto& patch : simulation.patches()) {
     if (patch.blank()) continue;
     std::int64_t* count = &counts[table.find(patch.id) * numbers];
-    count[present] = 1, count[contacts] = std::ssize(patch.contacts);
+    count[present] = 1, count[contacts] = std::ssize(patch.contacts), count[tools] = std::ssize(patch.tools);
     for_filled(patch, [&](const Piece<Dim>& piece) { count[points] += piece.points.size(), ++count[pieces]; });
   }
   MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM,
@@ -77,7 +77,7 @@ Layout layout_of(const Simulation<Dim>& simulation) {
     if (!count[present]) continue;
     layout.patches.push_back(table.patches()[p]);
     layout.points.push_back(count[points]), layout.pieces.push_back(count[pieces]);
-    layout.contacts.push_back(count[contacts]);
+    layout.contacts.push_back(count[contacts]), layout.tools.push_back(count[tools]);
   }
   return layout;
 }
@@ -95,13 +95,13 @@ void write_patches(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const 
     out.write(name, 1, layout.one_each(), mine);
   };
   write_counts("patch_points", layout.points), write_counts("patch_pieces", layout.pieces);
-  write_counts("patch_contacts", layout.contacts);
+  write_counts("patch_contacts", layout.contacts), write_counts("patch_tools", layout.tools);
   for (const auto& column : ledger_columns)
     out.template write_patches<double>(column.name, [&](const P& p) { return p.ledger.*column.value; });
 
-  std::vector<std::int32_t> body, states, pairs;
+  std::vector<std::int32_t> body, states, pairs, tools;
   std::vector<std::int64_t> count;
-  std::vector<double> sums;
+  std::vector<double> sums, pressed;
   for (const P* patch : patches) {
     for_filled(*patch, [&](const Piece<Dim>& piece) {
       body.push_back(piece.body), count.push_back(piece.points.size());
@@ -111,12 +111,18 @@ void write_patches(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const 
       pairs.push_back(pair.first), pairs.push_back(pair.second);
       sums.insert(sums.end(), sum.values.begin(), sum.values.end());
     }
+    for (const auto& [tool, sum] : patch->tools) {
+      tools.push_back(tool);
+      pressed.insert(pressed.end(), sum.total.begin(), sum.total.end());
+    }
   }
   out.write("piece_body", 1, layout.pieces, body);
   out.write("piece_points", 1, layout.pieces, count);
   out.write("piece_states", 1, layout.pieces, states);
   out.write("contact_bodies", 2, layout.contacts, pairs);
   out.write("contact_sums", ContactSum<Dim>::size, layout.contacts, sums);
+  out.write("tool_number", 1, layout.tools, tools);
+  out.write("tool_sums", ToolSum::size, layout.tools, pressed);
 }
 
 /// One quantity at a time, so that little memory is needed beside the points.
@@ -148,6 +154,16 @@ void write_points(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const L
   }
 }
 
+/// A table that every rank knows and rank 0 writes.
+void write_on_first(CheckpointWriter& writer, const char* name, int components, const std::vector<double>& values,
+                    MPI_Comm comm) {
+  RowBlocks rows{{}, std::ssize(values) / components};
+  int rank = 0;
+  MPI_Comm_rank(comm, &rank);
+  if (rank == 0 && !values.empty()) rows.blocks.push_back({0, rows.total_rows});
+  writer.write({name, components, std::span<const double>(values).first(rank == 0 ? values.size() : 0)}, rows);
+}
+
 void write_state(CheckpointWriter& writer, const RunState& state, MPI_Comm comm) {
   for_each_number(state, [&]<class T>(const std::string& name, const T& value) {
     if constexpr (std::is_same_v<T, std::uint64_t>)
@@ -158,12 +174,8 @@ void write_state(CheckpointWriter& writer, const RunState& state, MPI_Comm comm)
   std::vector<double> times;
   std::string names;
   for (const auto& entry : state.series) times.push_back(entry.time), names += entry.name + "\n";
-  RowBlocks rows{{}, std::ssize(times)};
-  int rank = 0;
-  MPI_Comm_rank(comm, &rank);
-  if (rank == 0 && !times.empty()) rows.blocks.push_back({0, rows.total_rows});
-  if (rank != 0) times.clear();
-  writer.write({"series_time", 1, std::span<const double>(times)}, rows);
+  write_on_first(writer, "series_time", 1, times, comm);
+  write_on_first(writer, "tool_state", tool_state_size, state.tools, comm);
   writer.add_text("series_names", names);
 }
 
@@ -173,8 +185,8 @@ std::int64_t bytes_of(const Layout& layout, int states, std::size_t texts) {
   const auto sum = [](const Counts& counts) { return std::accumulate(counts.begin(), counts.end(), std::int64_t{0}); };
   constexpr std::int64_t point = 8 + 4 * image_components, piece = 16, patch = 8 * 50;
   return sum(layout.points) * (point + 8 * (PointColumns<Dim>::state + states)) + sum(layout.pieces) * piece +
-         sum(layout.contacts) * (8 + 8 * ContactSum<Dim>::size) + std::ssize(layout.points) * patch +
-         static_cast<std::int64_t>(texts);
+         sum(layout.contacts) * (8 + 8 * ContactSum<Dim>::size) + sum(layout.tools) * (4 + 8 * ToolSum::size) +
+         std::ssize(layout.points) * patch + static_cast<std::int64_t>(texts);
 }
 
 }  // namespace

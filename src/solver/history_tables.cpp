@@ -32,9 +32,14 @@ std::vector<std::string> body_columns(int dimension) {
   return {"step", "time", "body", "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz", "lx", "ly", "lz"};
 }
 
+std::vector<std::string> force_columns() {
+  return {"step", "time", "tool", "name", "x",  "y",  "z",  "vx",        "vy",        "vz",        "wx",  "wy",
+          "wz",   "fx",   "fy",   "fz",   "mx", "my", "mz", "impulse_x", "impulse_y", "impulse_z", "work"};
+}
+
 template <int Dim>
 void HistoryTables<Dim>::open(const RunState* from) {
-  const auto history = out_ / "history.csv", bodies = out_ / "bodies.csv";
+  const auto history = out_ / "history.csv", bodies = out_ / "bodies.csv", forces = out_ / "forces.csv";
   const bool go_on = from != nullptr && std::filesystem::exists(history);
   history_ =
       go_on ? CsvWriter(history, history_columns(Dim), from->history_file) : CsvWriter(history, history_columns(Dim));
@@ -42,12 +47,17 @@ void HistoryTables<Dim>::open(const RunState* from) {
     bodies_ = CsvWriter(bodies, body_columns(Dim), from->bodies_file);
   else if (!track_.empty())
     bodies_ = CsvWriter(bodies, body_columns(Dim));
+  if (go_on && from->forces_file.bytes > 0)
+    forces_ = CsvWriter(forces, force_columns(), from->forces_file);
+  else if (with_forces_)
+    forces_ = CsvWriter(forces, force_columns());
 }
 
 template <int Dim>
 void HistoryTables<Dim>::note_positions(RunState& state) const {
   state.history_file = history_.position();
   if (bodies_.position().bytes > 0) state.bodies_file = bodies_.position();
+  if (forces_.position().bytes > 0) state.forces_file = forces_.position();
 }
 
 template <int Dim>
@@ -89,6 +99,25 @@ void HistoryTables<Dim>::add_bodies(const Simulation<Dim>& simulation) {
       for (int d = 0; d < 3; ++d)
         if (d < Dim || group >= 2) row.emplace_back(all[i + 1 + 3 * group + d]);
     bodies_.add_row(row);
+  }
+}
+
+template <int Dim>
+void HistoryTables<Dim>::add_forces(const Simulation<Dim>& simulation) {
+  const std::vector<ToolSum> sums = simulation.tool_sums();
+  const double dt = simulation.dt();
+  for (std::size_t t = 0; t < simulation.tools().size(); ++t) {
+    const Tool& tool = simulation.tools()[t];
+    if (!simulation.has_tool(static_cast<int>(t))) continue;
+    const ToolSum& sum = sums[t];
+    const Vec3 x = tool.centre + tool.travel, impulse(sum.last[0], sum.last[1], sum.last[2]);
+    const Vec3 moment = Vec3(sum.last[3], sum.last[4], sum.last[5]) - x.cross(impulse);
+    std::vector<CsvValue> row = {simulation.steps(), simulation.time(), static_cast<std::int64_t>(t), tool.name};
+    for (const Vec3& v : {x, tool.now, tool.spin_now}) row.insert(row.end(), v.data(), v.data() + 3);
+    for (const Vec3& v : {impulse, moment})
+      for (int i = 0; i < 3; ++i) row.emplace_back(dt > 0 ? v[i] / dt : 0.0);
+    for (int i : {0, 1, 2, 6}) row.emplace_back(sum.total[i]);
+    forces_.add_row(row);
   }
 }
 

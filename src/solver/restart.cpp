@@ -57,8 +57,9 @@ std::unique_ptr<Checkpoint> open_latest(const fs::path& out, MPI_Comm comm) {
 
 /// Turning rigid bodies turn about centres that follow from their velocities since the start.
 bool turns_rigidly(const Case& c) {
-  const auto turns = [](const auto& body) { return body.angular_velocity != Vec3::Zero(); };
-  return std::ranges::any_of(c.drives, turns) || std::ranges::any_of(c.bodies, [&](const BodySpec& body) {
+  const auto turns = [](const BodySpec& body) { return body.angular_velocity != Vec3::Zero(); };
+  const auto spins = [](const Drive& drive) { return !drive.angular_velocity.is_zero(); };
+  return std::ranges::any_of(c.drives, spins) || std::ranges::any_of(c.bodies, [&](const BodySpec& body) {
            return c.materials[body.material].model == "rigid" && turns(body);
          });
 }
@@ -102,12 +103,13 @@ void check_changes(const Case& c, const std::vector<KeyChange>& changes, bool al
 std::string check_folder(const Case& c, const fs::path& out, const RunState& state, const fs::path& checkpoint) {
   constexpr const char* remedy = "; choose another --out to go on there";
   const int dimension = c.domain.dimension;
-  const fs::path history = out / "history.csv", bodies = out / "bodies.csv";
+  const fs::path history = out / "history.csv", bodies = out / "bodies.csv", forces = out / "forces.csv";
   std::string error;
   if (fs::exists(history)) {
     error = check_prefix(history, history_columns(dimension), state.history_file);
     if (error.empty() && state.bodies_file.bytes > 0)
       error = check_prefix(bodies, body_columns(dimension), state.bodies_file);
+    if (error.empty() && state.forces_file.bytes > 0) error = check_prefix(forces, force_columns(), state.forces_file);
     return error.empty() ? "" : error + remedy;
   }
   std::error_code ignored;

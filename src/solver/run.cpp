@@ -34,7 +34,7 @@ constexpr double wall_limit_reached = 1000, file_failed = 2000;
 /// For each mass [J/kg]; EnergyBook.
 double energy_that_matters(const Case& c) {
   double speed = 0;
-  for (const auto& drive : c.drives) speed = std::max(speed, drive.velocity.norm());
+  for (const auto& drive : c.drives) speed = std::max(speed, drive.velocity.largest());
   for (const auto& face : c.faces) speed = std::max(speed, face.velocity.norm());
   return c.domain.gravity.norm() * smallest_cell(c.domain) + 0.5 * speed * speed;
 }
@@ -52,15 +52,16 @@ class Run {
         particles_(c.output.particles),
         grains_(c.output.grains),
         contacts_(c.output.contacts),
+        forces_(c.output.forces),
         history_clock_(c.output.history),
         checkpoints_(c.output.checkpoint),
         particle_index_(settings.out / "particles.hdf.series"),
-        tables_(settings.out, c.output.track),
+        tables_(settings.out, c.output.track, c.output.forces.active()),
         book_(energy_that_matters(c)) {
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &ranks_);
-    for (const Schedule* s :
-         {&c.output.particles, &c.output.grains, &c.output.contacts, &c.output.history, &c.output.checkpoint})
+    for (const Schedule* s : {&c.output.particles, &c.output.grains, &c.output.contacts, &c.output.forces,
+                              &c.output.history, &c.output.checkpoint})
       needs_wall_ = needs_wall_ || s->interval_wall > 0;
     if (from) restore(from->state());
     simulation_.ask([this] { return notice(); });
@@ -211,6 +212,7 @@ class Run {
     };
     const auto name = [](const char* kind, const OutputClock& clock) { return numbered_name(kind, clock.count() - 1); };
     if (wanted(history_clock_)) write_history();
+    if (wanted(forces_)) tables_.add_forces(simulation_);
     if (wanted(particles_)) {
       const std::string file = name("particles", particles_);
       write_particles(simulation_, next_result(file), case_.output.particles.fields);
@@ -258,10 +260,11 @@ class Run {
     flush_results();  // what comes before a checkpoint is not written again
     RunState state;
     state.step = simulation_.step_state();
+    state.tools = simulation_.tool_states();
     tables_.note_positions(state);
     share_rank_zero(state);
     state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
-    state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
+    state.forces = forces_.state(), state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
     state.contacts_cleared = contacts_cleared_, state.contacts_kept = contacts_kept();
     state.series = particle_index_.entries();
     state.bodies = bodies_checksum(case_);
@@ -279,11 +282,12 @@ class Run {
     MPI_Bcast(&state.wall, 1, MPI_DOUBLE, 0, comm_);
     MPI_Bcast(&state.history_file, sizeof state.history_file, MPI_BYTE, 0, comm_);
     MPI_Bcast(&state.bodies_file, sizeof state.bodies_file, MPI_BYTE, 0, comm_);
+    MPI_Bcast(&state.forces_file, sizeof state.forces_file, MPI_BYTE, 0, comm_);
   }
 
   void restore(const RunState& state) {
     particles_.restore(state.particles), grains_.restore(state.grains), contacts_.restore(state.contacts);
-    history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
+    forces_.restore(state.forces), history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
     book_.restore(state.energy);
     // Contacts that this run is the first to keep are summed from now on.
     contacts_cleared_ = contacts_kept() && !state.contacts_kept ? simulation_.time() : state.contacts_cleared;
@@ -357,7 +361,7 @@ class Run {
   StopSignals signals_;
   double start_;
   Simulation<Dim> simulation_;
-  OutputClock particles_, grains_, contacts_, history_clock_, checkpoints_;
+  OutputClock particles_, grains_, contacts_, forces_, history_clock_, checkpoints_;
   SeriesIndex particle_index_;
   HistoryTables<Dim> tables_;
   EnergyBook book_;

@@ -51,8 +51,8 @@ std::vector<Body> make_bodies(const Case& c, const std::vector<SolverMaterial>& 
     for (std::size_t b = 0; b < bodies.size(); ++b) {
       if (!selects(drive, c.bodies[b], static_cast<int>(b), c.domain)) continue;
       bodies[b].rigid = true;
-      bodies[b].velocity = drive.velocity;
-      bodies[b].angular_velocity = drive.angular_velocity;
+      bodies[b].velocity = drive.velocity.at(0);
+      bodies[b].angular_velocity = drive.angular_velocity.at(0);
     }
   }
   return bodies;
@@ -322,6 +322,9 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   contact_.chords = c.solver.stress_update == StressUpdate::both;
   bodies_ = make_bodies(c, materials_);
+  tools_ = make_tools(c, bodies_);
+  has_pistons_ = std::ranges::any_of(tools_, [](const Tool& tool) { return tool.piston.mass > 0; });
+  contact_.keep_tools = c.output.forces.active() || has_pistons_;
   speeds_.wave = first_step(c).wave_speed;
   for (int d = 0; d < Dim; ++d)
     for (int side = 0; side < 2; ++side) {
@@ -369,6 +372,7 @@ void Simulation<Dim>::restore(const Checkpoint& from) {
   connect_patches();
   const StepState& state = from.state().step;
   time_ = state.time, dt_ = state.dt, steps_ = state.steps;
+  restore_tools(from.state().tools);
   maxima_[0] = state.wave_speed, maxima_[1] = state.point_speed;
   speeds_ = {};
 }

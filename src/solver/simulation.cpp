@@ -57,6 +57,7 @@ void Simulation<Dim>::step(double longest) {
   const double share = update == StressUpdate::both ? 0.5 : 1.0;
 
   choose_time_step(longest);
+  begin_tools();
   filter_noise();
   exchange_->begin_sums(transfer_.extras);
   exchange_after([&](std::size_t, P& patch) { project_points(patch); });
@@ -78,6 +79,7 @@ void Simulation<Dim>::step(double longest) {
       update_momentum(p, patch);
       accelerate_points(patch);
     });
+    push_pistons();
   }
   migrate_after([&](std::size_t p, P& patch) {
     again ? project_again(p, patch) : update_momentum(p, patch);
@@ -85,6 +87,7 @@ void Simulation<Dim>::step(double longest) {
   });
   look_for_fault(1);
   receive_points();
+  end_tools();
   time_ += dt_;
   ++steps_;
   if (parallel_.balance_every > 0 && steps_ % parallel_.balance_every == 0) balance();
@@ -181,7 +184,7 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
     motions_.lend(piece.nodes.motion);
     integrate(piece, dt_);
   }
-  constrain_motion(patch, lattice_, contact_.faces, bodies_, dt_, last);
+  constrain_motion(patch, lattice_, contact_.faces, bodies_, dt_, last, contact_.keep_tools);
 }
 
 template <int Dim>
@@ -268,25 +271,27 @@ void Simulation<Dim>::turn_stress(Piece<Dim>& piece) {
   if (!std::isfinite(unlimited.wave)) speeds_.wave = unlimited.wave;
 }
 
-/// Points of a rigid body turn about its centre, which moves with the body's velocity.
+/// Points of a rigid body turn about its centre, which travels with its tool.
 template <int Dim>
 void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
   using C = PointColumns<Dim>;
   const Body& body = bodies_[piece.body];
+  const Tool& tool = tools_[body.tool];
   Points<Dim>& points = piece.points;
-  const double speed = body.angular_velocity.norm();
-  const Vec3 axis = speed > 0 ? Vec3(body.angular_velocity / speed) : Vec3::UnitZ();
+  const Vec3 spin = tool.spin_of_step(), way = dt_ * tool.of_step(), centre = body.centre + tool.travel;
+  const double speed = spin.norm();
+  const Vec3 axis = speed > 0 ? Vec3(spin / speed) : Vec3::UnitZ();
   const Mat3 turn = Eigen::AngleAxisd(speed * dt_, axis).toRotationMatrix();
-  const Vec3 centre = body.centre + time_ * body.velocity;
   for (int p = 0; p < points.size(); ++p) {
     Vec3 arm = Vec3::Zero();
     for (int d = 0; d < Dim; ++d) arm[d] = points.column(d)[p] + points.images()[p][d] * lattice_.length(d) - centre[d];
     const Vec3 turned = speed > 0 ? Vec3(turn * arm) : arm;
-    const Vec3 velocity = body.velocity + body.angular_velocity.cross(turned);
+    const Vec3 velocity = tool.next + tool.spin_next.cross(turned);
     for (int d = 0; d < Dim; ++d) {
-      points.column(d)[p] += dt_ * body.velocity[d] + turned[d] - arm[d];
+      points.column(d)[p] += way[d] + turned[d] - arm[d];
       points.column(C::velocity + d)[p] = velocity[d];
     }
+    for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = tool.spin_next[Dim == 2 ? 2 : s];
     speeds_.point = std::max(speeds_.point, velocity.norm());
   }
 }

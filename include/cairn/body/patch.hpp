@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cairn/body/piece.hpp"
+#include "cairn/body/tool.hpp"
 #include "cairn/grid/lattice.hpp"
 
 namespace cairn {
@@ -69,6 +70,7 @@ struct Patch {
   PatchLedger ledger;
   double seconds = 0;  // processor time spent on it since the last balance; steers nothing but balance
   std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
+  std::map<int, ToolSum> tools;                             // by their number; likewise
 
   Patch(PatchId id_, const Lattice<Dim>& lattice)
       : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
@@ -80,7 +82,7 @@ struct Patch {
   }
 
   /// Whether nothing has to be remembered of it: sums over all patches may leave it out.
-  bool blank() const { return point_count() == 0 && contacts.empty() && ledger == PatchLedger{}; }
+  bool blank() const { return point_count() == 0 && contacts.empty() && tools.empty() && ledger == PatchLedger{}; }
 
   std::int64_t point_count() const {
     std::int64_t n = 0;

@@ -10,9 +10,11 @@ namespace cairn {
 struct Body {
   std::int32_t material = 0;
   bool rigid = false;                    // moves as prescribed, infinitely heavy in contact
-  Vec3 velocity = Vec3::Zero();          // of a rigid body [m/s]
-  Vec3 angular_velocity = Vec3::Zero();  // of a rigid body [rad/s] about its centre
+  Vec3 velocity = Vec3::Zero();          // of a rigid body, now [m/s]
+  Vec3 angular_velocity = Vec3::Zero();  // of a rigid body, now [rad/s] about its centre
   Vec3 centre = Vec3::Zero();            // at the start [m]
+  Vec3 change = Vec3::Zero();            // of a rigid body's velocity in this step, where that is given [m/s]
+  std::int32_t tool = -1;                // that a rigid body belongs to (body/tool.hpp)
 };
 
 /// Sums over the points of a body at a node, eight doubles a node:

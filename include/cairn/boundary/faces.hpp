@@ -1,6 +1,6 @@
 #pragma once
-/// Faces of the domain as conditions on nodal velocities: fixed faces and symmetry planes. Nodes beyond a face follow it: a
-/// fixed face's velocity holds there too, and beyond a symmetry plane lies the mirror image. Walls are contact
+/// Faces of the domain as conditions on nodal velocities: fixed faces and symmetry planes. Nodes beyond a face follow
+/// it: a fixed face's velocity holds there too, and beyond a symmetry plane lies the mirror image. Walls are contact
 /// (contact/sweep.hpp). To add a kind of face: FaceType, its name in the case reader, and here.
 
 #include "cairn/contact/settings.hpp"
@@ -26,9 +26,10 @@ template <int Dim>
 void constrain_velocity(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
                         const std::vector<Body>& bodies, bool close_ledger);
 /// Fixed faces, after the momentum update: velocity, and the acceleration that leads to it (Nairn 2013, section 2.4);
-/// the work goes into the ledger, and with `close_ledger` (nothing is projected again) the loss as well.
+/// the work goes into the ledger, with `close_ledger` (nothing is projected again) the loss as well, and with
+/// `keep_tools` what the faces take into the patch's tools.
 template <int Dim>
 void constrain_motion(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces,
-                      const std::vector<Body>& bodies, double dt, bool close_ledger);
+                      const std::vector<Body>& bodies, double dt, bool close_ledger, bool keep_tools = false);
 
 }  // namespace cairn

@@ -1,5 +1,5 @@
 #pragma once
-/// How a rigid body that turns moves at a node, as contact sees it.
+/// How a rigid body that turns or gathers speed moves at a node, as contact sees it.
 ///
 /// In a step its points go round along chords. What sticks to it must as well: along the tangent it would spiral
 /// outwards, by t^2/2 of the radius in a step of angle t. With u = w x arm, chords of the step before and of this step
@@ -20,11 +20,12 @@ struct Course {
 template <int Dim>
 Course<Dim> course_of(const Body& body, const Vec<Dim>& now, double dt) {
   const double speed = body.angular_velocity.norm(), angle = speed * dt;
+  if (speed == 0) return {now, body.change.head<Dim>()};
   Vec3 u = -body.velocity;
   u.head<Dim>() += now;
   const Vec3 inwards = (1 - std::cos(angle)) / angle * body.angular_velocity.cross(u) / speed;
   const Vec3 start = body.velocity + std::sin(angle) / angle * u - inwards;
-  return {start.head<Dim>(), 2 * inwards.head<Dim>()};
+  return {start.head<Dim>(), (2 * inwards + body.change).template head<Dim>()};
 }
 
 }  // namespace cairn::contact

@@ -39,6 +39,17 @@ bool at_face(const Index<Dim>& place, int face, const Lattice<Dim>& lattice) {
   return !lattice.periodic(d) && (face % 2 == 0 ? place[d] <= 0 : place[d] >= lattice.cells()[d]);
 }
 
+/// Share of a node in sums over a patch: 0 where another patch answers for it. On a symmetry plane sums hold both
+/// halves; beyond it they are the image of those inside.
+template <int Dim>
+double node_share(int patch, const Index<Dim>& place, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces) {
+  double share = lattice.owns_node(patch, place) ? 1.0 : 0.0;
+  for (int face = 0; face < 2 * Dim; ++face)
+    if (faces[face].type == FaceType::symmetry && at_face<Dim>(place, face, lattice))
+      share *= place[face / 2] == 0 || place[face / 2] == lattice.cells()[face / 2] ? 0.5 : 0.0;
+  return share;
+}
+
 /// Contact settings of a run.
 template <int Dim>
 struct ContactSettings {
@@ -48,6 +59,7 @@ struct ContactSettings {
   FaceConditions<Dim> faces{};
   contact::TouchingGap gap, gap_at_wall;
   bool keep_contacts = false;  // sum what passes between pairs, for output
+  bool keep_tools = false;     // sum what bodies do to tools
   // Rigid bodies turn along chords (contact/course.hpp), not tangents. Chords strain what sticks to them by t^2/2 in
   // and out: for steps that take the strain at their start and at their end, as "both" does, so that the two cancel.
   bool chords = true;

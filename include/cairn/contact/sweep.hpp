@@ -22,7 +22,8 @@ struct ContactEntry {
   int material = 0;
   double mass = 0;
   bool rigid = false;
-  int turning = -1;  // a rigid body that turns: its position in ContactSweep::turning_
+  int turning = -1;  // a rigid body that turns or gathers speed: its position in ContactSweep::turning_
+  int tool = -1;     // that a rigid body belongs to
   contact::NodeRecord<Dim> record;
 };
 
@@ -111,6 +112,7 @@ class ContactSweep {
   // sweep.cpp
   void load_node(const Node& node, const Patch<Dim>& patch, Pass pass, double dt);
   void keep_contacts(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
+  void keep_tools(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
   void keep_ledger(const Node& node, Patch<Dim>& patch, double dt, bool projected_again) const;
 
   Box<Dim> box_;
@@ -118,7 +120,7 @@ class ContactSweep {
   std::vector<Node> nodes_;
   std::vector<ContactEntry<Dim>> entries_;
   std::vector<NodePair<Dim>> pairs_;
-  std::vector<Body> turning_;  // the rigid bodies among them that turn
+  std::vector<Body> turning_;  // the rigid bodies among them that turn or gather speed
   std::array<Vec<Dim>, 2 * Dim> wall_velocities_;
   // Of the node in hand:
   std::vector<Vec<Dim>> momenta_, forces_, impulses_;

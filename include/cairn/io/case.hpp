@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cairn/body/shape.hpp"
+#include "cairn/body/tool.hpp"
 #include "cairn/core/options.hpp"
 
 namespace cairn {
@@ -60,8 +61,9 @@ struct Drive {
   double within = 0;     // with overlapping: or comes closer to it than this [m]
   std::vector<int> ids;
   std::string group;
-  Vec3 velocity = Vec3::Zero();          // [m/s]
-  Vec3 angular_velocity = Vec3::Zero();  // [rad/s] about each body's centre
+  MotionTable velocity;          // [m/s]
+  MotionTable angular_velocity;  // [rad/s] about each body's centre
+  Piston piston;
 };
 
 struct Face {
@@ -82,7 +84,7 @@ struct Schedule {
 };
 
 struct Output {
-  Schedule particles, grains, contacts, history, checkpoint;
+  Schedule particles, grains, contacts, forces, history, checkpoint;
   std::vector<int> track;  // bodies of bodies.csv
 };
 

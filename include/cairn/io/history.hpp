@@ -13,8 +13,8 @@
 
 namespace cairn {
 
-/// One number of a row.
-using CsvValue = std::variant<double, std::int64_t>;
+/// One entry of a row: a number, or a word without commas.
+using CsvValue = std::variant<double, std::int64_t, std::string>;
 
 /// How far a file has been written, and the checksum of all of it (checksum.hpp).
 struct CsvPosition {

@@ -14,9 +14,9 @@ inline constexpr const char* failure_file = "failure_particles.vtkhdf";
 /// Which program wrote the results, and when.
 inline constexpr const char* record_file = "run.json";
 
-/// True for the names of result files: history.csv, bodies.csv, particles_N.vtkhdf, grains_N.h5, contacts_N.h5 and
-/// checkpoint_N.h5 with N a number, particles.hdf.series and failure_particles.vtkhdf. What a run reads again,
-/// case.toml and the copies of its grain tables, is none.
+/// True for the names of result files: history.csv, bodies.csv, forces.csv, particles_N.vtkhdf, grains_N.h5,
+/// contacts_N.h5 and checkpoint_N.h5 with N a number, particles.hdf.series and failure_particles.vtkhdf. What a run
+/// reads again, case.toml and the copies of its grain tables, is none.
 bool is_result_name(const std::string& name);
 
 /// The result files in `folder`, sorted; none if there is no such folder. Not collective.

@@ -64,6 +64,7 @@ std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm)
 
 /// The whole numbers of all ranks one after the other, in the order of the ranks. Collective.
 std::vector<std::int64_t> gather_on_all(std::span<const std::int64_t> mine, MPI_Comm comm);
+std::vector<double> gather_on_all(std::span<const double> mine, MPI_Comm comm);
 
 /// The largest of each of a few numbers over all ranks, found while other work is done.
 class MaximumReduction {

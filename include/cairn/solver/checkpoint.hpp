@@ -50,7 +50,7 @@ class Checkpoint {
   RunState state_;
   std::string case_text_;
   std::vector<PatchId> patches_;
-  std::vector<std::int64_t> points_, pieces_, contacts_;  // of each
+  std::vector<std::int64_t> points_, pieces_, contacts_, tools_;  // of each
 };
 
 }  // namespace cairn

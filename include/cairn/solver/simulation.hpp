@@ -55,6 +55,9 @@ struct Notice {
 
 class Checkpoint;
 
+/// The tools of a case; every rigid body learns which it belongs to.
+std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies);
+
 template <int Dim>
 class Simulation {
  public:
@@ -95,6 +98,18 @@ class Simulation {
       for (auto& piece : patch.pieces) piece.projected = false;
     return patches_;
   }
+  const std::vector<Tool>& tools() const { return tools_; }
+  /// Of faces those that hold something are tools.
+  bool has_tool(int tool) const {
+    if (tool >= tools_of_faces) return true;
+    return tool < 2 * Dim &&
+           (contact_.faces[tool].type == FaceType::wall || contact_.faces[tool].type == FaceType::fixed);
+  }
+  /// What bodies did to every tool so far and in the last step, summed in patch order; kept only where the case writes
+  /// forces. Collective; the result is valid on rank 0.
+  std::vector<ToolSum> tool_sums() const;
+  /// Their states, tool_state_size numbers for each.
+  std::vector<double> tool_states() const;
   const PatchTable<Dim>& table() const { return table_; }
   /// Patches that this rank computed so far, once for each stage between exchanges: empty ones are passed over.
   std::int64_t patches_computed() const { return patches_computed_; }
@@ -136,6 +151,14 @@ class Simulation {
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
   void finish_points(Patch<Dim>& patch, double share);
   void receive_points();  // communicates
+
+  // Between the stages: how tools move in the step (tools.cpp).
+  void begin_tools();
+  void push_pistons();  // communicates where there are some
+  void end_tools();
+  void set_velocities_of_tools();
+  void restore_tools(const std::vector<double>& states);
+  std::vector<double> tool_records(bool pistons) const;
 
   void place_points(const Case& c);
   void restore(const Checkpoint& from);
@@ -202,7 +225,7 @@ class Simulation {
   void turn_stress(Piece<Dim>& piece);
   void move_rigid(Piece<Dim>& piece);
   bool turns_rigidly(const Piece<Dim>& piece) const {
-    return is_rigid(piece) && bodies_[piece.body].angular_velocity != Vec3::Zero();
+    return is_rigid(piece) && !tools_[bodies_[piece.body].tool].spin.is_zero();
   }
   /// Points of rigid bodies that turn always carry spin, so that nodes have exactly the body's motion.
   const TransferSettings<Dim>& transfer_of(const Piece<Dim>& piece) const {
@@ -236,6 +259,8 @@ class Simulation {
   ContactSettings<Dim> contact_;
   std::vector<SolverMaterial> materials_;
   std::vector<Body> bodies_;
+  std::vector<Tool> tools_;
+  bool has_pistons_ = false;
   std::vector<Patch<Dim>> patches_;
   PatchTable<Dim> table_;
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank

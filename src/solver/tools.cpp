@@ -1,0 +1,152 @@
+// Tools: what they are, how they move, and what bodies do to them.
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "cairn/solver/simulation.hpp"
+
+namespace cairn {
+namespace {
+
+constexpr const char* names_of_faces[] = {"left", "right", "bottom", "top", "back", "front"};
+
+/// The record of one patch's sum on its way: patch, tool, total, last.
+constexpr int record_size = 2 + ToolSum::size + 6;
+
+/// Adds records in the order of their patches.
+std::vector<ToolSum> sum_in_order(const std::vector<double>& records, std::size_t tools) {
+  std::map<std::pair<double, double>, const double*> ordered;  // patch, tool
+  for (std::size_t i = 0; i < records.size(); i += record_size) ordered[{records[i], records[i + 1]}] = &records[i + 2];
+  std::vector<ToolSum> sums(tools);
+  for (const auto& [key, values] : ordered) {
+    ToolSum sum;
+    std::copy_n(values, ToolSum::size, sum.total.begin());
+    std::copy_n(values + ToolSum::size, 6, sum.last.begin());
+    sums[static_cast<std::size_t>(key.second)].add(sum);
+  }
+  return sums;
+}
+
+}  // namespace
+
+std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
+  std::vector<Tool> tools(tools_of_faces);
+  for (int face = 0; face < tools_of_faces; ++face) {
+    tools[face].name = names_of_faces[face];
+    tools[face].centre = 0.5 * (c.domain.lower + c.domain.upper);
+    tools[face].centre[face / 2] = face % 2 ? c.domain.upper[face / 2] : c.domain.lower[face / 2];
+    tools[face].velocity = c.faces[face].velocity;
+  }
+  for (std::size_t d = 0; d < c.drives.size(); ++d) {
+    const Drive& drive = c.drives[d];
+    Tool tool{drive.group.empty() ? fmt::format("drive{}", d) : drive.group, Vec3::Zero(), drive.velocity,
+              drive.angular_velocity, drive.piston};
+    int count = 0;
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      if (selects(drive, c.bodies[b], static_cast<int>(b), c.domain)) {
+        bodies[b].tool = static_cast<std::int32_t>(tools.size());
+        tool.centre += bodies[b].centre, ++count;
+      }
+    if (count > 0) tool.centre /= count;
+    tools.push_back(std::move(tool));
+  }
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (!bodies[b].rigid || bodies[b].tool >= 0) continue;
+    bodies[b].tool = static_cast<std::int32_t>(tools.size());
+    tools.push_back({fmt::format("body{}", b), bodies[b].centre, bodies[b].velocity, bodies[b].angular_velocity, {}});
+  }
+  for (Tool& tool : tools) tool.now = tool.next = tool.velocity.at(0), tool.spin_now = tool.spin_next = tool.spin.at(0);
+  return tools;
+}
+
+/// The velocity at the end of the step, as far as it is given.
+template <int Dim>
+void Simulation<Dim>::begin_tools() {
+  for (Tool& tool : tools_) {
+    if (!tool.moves()) continue;
+    tool.next = tool.velocity.at(time_ + dt_) + tool.speed * tool.piston.along;
+    tool.spin_next = tool.spin.at(time_ + dt_);
+  }
+  for (Body& body : bodies_)
+    if (body.tool >= 0 && tools_[body.tool].moves()) body.change = tools_[body.tool].next - tools_[body.tool].now;
+}
+
+/// What bodies press in this step moves the pistons. Collective where there are some.
+template <int Dim>
+void Simulation<Dim>::push_pistons() {
+  if (!has_pistons_) return;
+  const std::vector<ToolSum> sums = sum_in_order(gather_on_all(tool_records(true), comm_), tools_.size());
+  for (std::size_t t = 0; t < tools_.size(); ++t) {
+    Tool& tool = tools_[t];
+    if (tool.piston.mass == 0) continue;
+    const Vec3 pressed(sums[t].last[0], sums[t].last[1], sums[t].last[2]);
+    const double gained = (dt_ * tool.piston.force.at(time_).x() + pressed.dot(tool.piston.along)) / tool.piston.mass;
+    tool.speed += gained;
+    tool.next += gained * tool.piston.along;
+  }
+}
+
+template <int Dim>
+void Simulation<Dim>::end_tools() {
+  for (Tool& tool : tools_) {
+    tool.travel += dt_ * tool.of_step();
+    tool.now = tool.next, tool.spin_now = tool.spin_next;
+  }
+  set_velocities_of_tools();
+}
+
+template <int Dim>
+void Simulation<Dim>::set_velocities_of_tools() {
+  for (Body& body : bodies_)
+    if (body.tool >= 0 && tools_[body.tool].moves())
+      body.velocity = tools_[body.tool].now, body.angular_velocity = tools_[body.tool].spin_now;
+}
+
+/// Sums of this rank's patches; of the pistons alone, or of all tools.
+template <int Dim>
+std::vector<double> Simulation<Dim>::tool_records(bool pistons) const {
+  std::vector<double> records;
+  for (const auto& patch : patches_)
+    for (const auto& [tool, sum] : patch.tools) {
+      if (pistons && tools_[tool].piston.mass == 0) continue;
+      records.push_back(patch.id), records.push_back(tool);
+      records.insert(records.end(), sum.total.begin(), sum.total.end());
+      records.insert(records.end(), sum.last.begin(), sum.last.end());
+    }
+  return records;
+}
+
+template <int Dim>
+std::vector<ToolSum> Simulation<Dim>::tool_sums() const {
+  return sum_in_order(gather_on_first(tool_records(false), comm_), tools_.size());
+}
+
+template <int Dim>
+std::vector<double> Simulation<Dim>::tool_states() const {
+  std::vector<double> states;
+  for (const Tool& tool : tools_)
+    for (const double number : tool.state()) states.push_back(number);
+  return states;
+}
+
+template <int Dim>
+void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
+  for (std::size_t t = 0; t < tools_.size() && (t + 1) * tool_state_size <= states.size(); ++t)
+    tools_[t].restore(&states[t * tool_state_size]);
+  set_velocities_of_tools();
+}
+
+#define CAIRN_INSTANTIATE(Dim)                                              \
+  template std::vector<double> Simulation<Dim>::tool_states() const;        \
+  template void Simulation<Dim>::restore_tools(const std::vector<double>&); \
+  template void Simulation<Dim>::begin_tools();                             \
+  template void Simulation<Dim>::push_pistons();                            \
+  template void Simulation<Dim>::end_tools();                               \
+  template void Simulation<Dim>::set_velocities_of_tools();                 \
+  template std::vector<ToolSum> Simulation<Dim>::tool_sums() const;
+CAIRN_INSTANTIATE(2)
+CAIRN_INSTANTIATE(3)
+#undef CAIRN_INSTANTIATE
+
+}  // namespace cairn
