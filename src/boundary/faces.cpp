@@ -25,6 +25,22 @@ Box<Dim> at_face(Box<Dim> box, int d, int side, int plane) {
   return box;
 }
 
+/// The further rows' part of a mirror: the image of a crack that meets the plane at a right angle is its own.
+template <int Dim, class Row, class Double, class Exchange>
+void mirror_further(const NodeBox<Dim>& nodes, int d, int plane, int inwards, Row&& row, Double&& double_on_plane,
+                    Exchange&& exchange) {
+  const FurtherRows<Dim>& further = nodes.further;
+  for (std::size_t k = 0; k < further.rows.size(); ++k) {
+    const FurtherRow<Dim>& outside = further.rows[k];
+    if (outside.place[d] == plane) double_on_plane(row(nodes.row_of(static_cast<int>(k))));
+    if (outside.place[d] != plane - inwards) continue;
+    Index<Dim> place = outside.place;
+    place[d] += 2 * inwards;
+    const int inside = further.find(place, outside.sides);
+    if (inside >= 0) exchange(row(nodes.row_of(inside)), row(nodes.row_of(static_cast<int>(k))));
+  }
+}
+
 /// Which of a node's numbers change sign in a mirror across direction d.
 template <int Dim>
 using Parity = void (*)(int d, std::vector<bool>& odd);
@@ -40,19 +56,26 @@ void mirror(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceConditions
       auto& array = piece.nodes.*values;
       if (array.empty()) continue;
       const Box<Dim>& box = piece.nodes.box;
+      const auto double_on_plane = [&](double* here) {
+        for (int c = 0; c < width; ++c) here[c] = odd[c] ? 0.0 : 2 * here[c];
+      };
+      const auto exchange = [&](double* in, double* out) {
+        for (int c = 0; c < width; ++c) in[c] += odd[c] ? -out[c] : out[c], out[c] = odd[c] ? -in[c] : in[c];
+      };
       Box<Dim> on_plane = box;
       on_plane.lower[d] = plane, on_plane.upper[d] = plane + 1;
       for_each(intersection(on_plane, box), [&](const Index<Dim>& i) {
-        double* here = array.data() + static_cast<std::size_t>(box.offset(i)) * width;
-        for (int c = 0; c < width; ++c) here[c] = odd[c] ? 0.0 : 2 * here[c];
+        double_on_plane(array.data() + static_cast<std::size_t>(box.offset(i)) * width);
         Index<Dim> inside = i, outside = i;
         inside[d] += inwards, outside[d] -= inwards;
         if (!box.contains(outside)) return;
         double* out = array.data() + static_cast<std::size_t>(box.offset(outside)) * width;
         if (!box.contains(inside)) return;  // nothing inside: what lies beyond is its own image's image
-        double* in = array.data() + static_cast<std::size_t>(box.offset(inside)) * width;
-        for (int c = 0; c < width; ++c) in[c] += odd[c] ? -out[c] : out[c], out[c] = odd[c] ? -in[c] : in[c];
+        exchange(array.data() + static_cast<std::size_t>(box.offset(inside)) * width, out);
       });
+      mirror_further<Dim>(
+          piece.nodes, d, plane, inwards, [&](int row) { return array.data() + row * width; }, double_on_plane,
+          exchange);
     }
   });
 }
@@ -85,11 +108,15 @@ void for_fixed_nodes(Patch<Dim>& patch, const Lattice<Dim>& lattice, const FaceC
     for (auto& piece : patch.pieces) {
       if (bodies[piece.body].rigid) continue;
       const Box<Dim>& box = piece.nodes.box;
-      for_each(at_face(box, d, side, plane), [&](const Index<Dim>& i) {
-        const int node = box.offset(i);
+      const auto visit = [&](const Index<Dim>& i, int node) {
         if (piece.nodes.sums[static_cast<std::size_t>(node) * NodeSums<Dim>::width] > 0)
           f(piece, i, node, 2 * d + side);
-      });
+      };
+      const Box<Dim> there = at_face(box, d, side, plane);
+      for_each(there, [&](const Index<Dim>& i) { visit(i, box.offset(i)); });
+      for (std::size_t k = 0; k < piece.nodes.further.rows.size(); ++k)
+        if (const auto& place = piece.nodes.further.rows[k].place; there.contains(place))
+          visit(place, piece.nodes.row_of(static_cast<int>(k)));
     }
   });
 }

@@ -41,7 +41,7 @@ void ContactSweep<Dim>::find(const Patch<Dim>& patch, const Lattice<Dim>& lattic
   count_bodies(patch);
   list_nodes(patch, lattice, settings);
   list_entries(patch, settings, bodies);
-  pairs_.clear();
+  pairs_.clear(), wholes_.clear();
   for (auto& node : nodes_) list_pairs(node, patch, lattice, settings);
 }
 
@@ -54,6 +54,10 @@ void ContactSweep<Dim>::count_bodies(const Patch<Dim>& patch) {
     for_each_row(piece.nodes.box, box_, [&](int at, int n) {
       for (int i = 0; i < n; ++i, sums += N::width) bodies_at_[at + i] += sums[N::mass] > 0;
     });
+    for (const auto& row : piece.nodes.further.rows) {
+      bodies_at_[box_.offset(row.place)] += sums[N::mass] > 0;
+      sums += N::width;
+    }
   }
 }
 
@@ -90,19 +94,20 @@ void ContactSweep<Dim>::list_entries(const Patch<Dim>& patch, const ContactSetti
     const bool turns =
         settings.chords && body.rigid && (body.angular_velocity != Vec3::Zero() || body.change != Vec3::Zero());
     if (turns) turning_.push_back(body);
+    const auto list = [&](int place, int node, SideSet sides) {
+      if (place < 0) return;
+      const double mass = sums_at(piece, node)[NodeSums<Dim>::mass];
+      if (!(mass > 0)) return;
+      auto& entry = entries_[nodes_[place].first + filled[place]++];
+      entry.piece = static_cast<int>(k), entry.node = node, entry.sides = sides, entry.mass = mass;
+      entry.rigid = body.rigid, entry.material = body.material, entry.tool = body.tool;
+      if (turns) entry.turning = static_cast<int>(turning_.size()) - 1;
+    };
     int node = 0;
     for_each_row(piece.nodes.box, box_, [&](int row, int n) {
-      for (int i = 0; i < n; ++i, ++node) {
-        const int place = bodies_at_[row + i];
-        if (place < 0) continue;
-        const double mass = sums_at(piece, node)[NodeSums<Dim>::mass];
-        if (!(mass > 0)) continue;
-        auto& entry = entries_[nodes_[place].first + filled[place]++];
-        entry.piece = static_cast<int>(k), entry.node = node, entry.mass = mass;
-        entry.rigid = body.rigid, entry.material = body.material, entry.tool = body.tool;
-        if (turns) entry.turning = static_cast<int>(turning_.size()) - 1;
-      }
+      for (int i = 0; i < n; ++i, ++node) list(bodies_at_[row + i], node, {});
     });
+    for (const auto& row : piece.nodes.further.rows) list(bodies_at_[box_.offset(row.place)], node++, row.sides);
   }
 }
 
@@ -112,6 +117,13 @@ void ContactSweep<Dim>::list_pairs(Node& node, const Patch<Dim>& patch, const La
   const ContactEntry<Dim>* entry = &entries_[node.first];
   const bool own = settings.options.normal_choice == NormalChoice::own;
   const bool fixed = at_face_of_type<Dim>(FaceType::fixed, node.place, lattice, settings);
+  if (has_sides(node)) {
+    node.first_pair = static_cast<int>(pairs_.size());
+    list_sided_pairs(node, patch, lattice, settings, fixed);
+    if (!fixed) add_wall_pairs(node, patch, lattice, settings);
+    node.pair_count = static_cast<int>(pairs_.size()) - node.first_pair;
+    return;
+  }
   double deformable = 0;
   for (int i = 0; i < node.count; ++i) {
     if (!entry[i].rigid) deformable += entry[i].mass;
@@ -139,6 +151,12 @@ void ContactSweep<Dim>::list_pairs(Node& node, const Patch<Dim>& patch, const La
   node.pair_count = static_cast<int>(pairs_.size()) - node.first_pair;
 }
 
+/// The sums of an entry's body at its node.
+template <int Dim>
+const double* ContactSweep<Dim>::sums_of(const ContactEntry<Dim>& entry, const Patch<Dim>& patch) const {
+  return entry.whole >= 0 ? wholes_[entry.whole].data() : sums_at(patch.pieces[entry.piece], entry.node);
+}
+
 /// Nodes beyond a wall take the gap of the node on it, where material is seen from.
 template <int Dim>
 void ContactSweep<Dim>::add_wall_pairs(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
@@ -158,7 +176,8 @@ void ContactSweep<Dim>::add_wall_pairs(const Node& node, const Patch<Dim>& patch
       pair.a = i, pair.face = face, pair.law = wall.friction[entry.material], pair.normal = outward<Dim>(face);
       if (!piece.nodes.box.contains(on_wall)) continue;
       pair.gap_node = piece.nodes.box.offset(on_wall);
-      const double* sums = sums_at(piece, pair.gap_node);
+      const auto whole = contact::whole_sums<Dim>(piece, on_wall);
+      const double* sums = whole.data();
       if (!(sums[N::mass] > 0)) continue;
       pair.open = true;
       // A wall leaves a body half of a node's room: twice that is the room of which contact/gap.hpp speaks. What lies
@@ -179,10 +198,10 @@ void ContactSweep<Dim>::set_normals(const Node& node, const Patch<Dim>& patch, c
   const bool common = settings.options.normal_choice == NormalChoice::common;
   const auto* entry = &entries_[node.first];
   const auto gradient = [&](int i) -> Vec<Dim> {
-    return ConstNode<Dim>(sums_at(patch.pieces[entry[i].piece], entry[i].node) + NodeSums<Dim>::gradient);
+    return ConstNode<Dim>(sums_of(entry[i], patch) + NodeSums<Dim>::gradient);
   };
   const auto flatness = [&](int i) {
-    const double* sums = sums_at(patch.pieces[entry[i].piece], entry[i].node);
+    const double* sums = sums_of(entry[i], patch);
     const double volume = sums[NodeSums<Dim>::volume] / lattice.cell_volume();
     const double flat = std::sqrt(2 * std::clamp(std::min(volume, 1 - volume), 0.0, 0.5));
     const double size = settings.gradient_share(sums, lattice, lattice.cell_volume()).norm();
@@ -212,7 +231,7 @@ void ContactSweep<Dim>::set_gaps(const Node& node, const Patch<Dim>& patch, cons
   const auto* entry = &entries_[node.first];
   const double room = settings.room(node.place, lattice);
   const auto distance = [&](int i, const Vec<Dim>& normal) {
-    return settings.distance(sums_at(patch.pieces[entry[i].piece], entry[i].node), normal, lattice, room);
+    return settings.distance(sums_of(entry[i], patch), normal, lattice, room);
   };
   const auto yield = [&](int i) {
     const double speed = entry[i].rigid ? 0.0 : settings.materials[entry[i].material].wave_speed;
@@ -222,9 +241,9 @@ void ContactSweep<Dim>::set_gaps(const Node& node, const Patch<Dim>& patch, cons
     NodePair<Dim>& pair = pairs_[p];
     double nearest = std::numeric_limits<double>::infinity();
     for (int j = 0; j < node.count; ++j)
-      if (j != pair.a) nearest = std::min(nearest, distance(j, pair.normal));
+      if (entry[j].piece != entry[pair.a].piece) nearest = std::min(nearest, distance(j, pair.normal));
     pair.gap = distance(pair.a, pair.normal) + nearest;
-    pair.yield = yield(pair.a) + yield(node.partner);
+    pair.yield = yield(pair.a) + yield(pair.b == pair.none ? node.partner : pair.b);
   }
 }
 

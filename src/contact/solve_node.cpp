@@ -53,7 +53,7 @@ void ContactSweep<Dim>::solve(const Node& node, const Patch<Dim>& patch, const L
   for (int i = 0; i < node.count; ++i) impulses_[i].setZero(), mass += entries_[node.first + i].mass;
   for (int p = 0; p < node.pair_count; ++p) {
     NodePair<Dim>& pair = pairs[p];
-    const bool rigid = pair.face != pair.none || entries_[node.first + node.partner].rigid;
+    const bool rigid = pair.face != pair.none || (pair.crack == pair.none && entries_[node.first + node.partner].rigid);
     const double own = entries_[node.first + pair.a].mass;
     const double rest = rigid ? std::numeric_limits<double>::infinity() : mass - own;
     pair.impulse *= contact::impulse_scale<Dim>(pair.impulse, own, rest, lattice.spacing(), options.impulse_limit, dt);
@@ -77,10 +77,14 @@ void ContactSweep<Dim>::decide(const Node& node, const Patch<Dim>& patch, const 
     if (!pair.open || pair.law.binds()) continue;
     const double mass = reduced_mass(node, pair);
     const Vec<Dim> P = mass * relative_velocity(node, pair), F = mass * relative_acceleration(node, pair);
+    if (pair.crack != pair.none) {
+      pair.decision = decide_across(pair, P, F, mass, dt);
+      continue;
+    }
     double pressing = F.dot(pair.normal);
     if (pair.face != pair.none) {
       const auto& piece = patch.pieces[entries_[node.first + pair.a].piece];
-      pressing = contact::vector_of<Dim>(piece.nodes.force, pair.gap_node).dot(pair.normal);
+      pressing = contact::whole_force<Dim>(piece, pair.gap_node).dot(pair.normal);
     }
     const auto& gap = pair.face == pair.none ? settings.gap : settings.gap_at_wall;
     pair.decision = gap.touches(pair.gap, pair.yield * pressing)
@@ -151,7 +155,10 @@ void ContactSweep<Dim>::bring_to_rest(const Node& node) {
     for (int c = 0; c <= r; ++c)
       matrix_(r, c) = rows_[r].along.dot(rows_[c].along) * coupling(pair, pairs[rows_[c].pair]);
   }
-  right_ = matrix_.template selfadjointView<Eigen::Lower>().ldlt().solve(right_).eval();
+  if (crosses_cracks(node))
+    solve_for_least();
+  else
+    right_ = matrix_.template selfadjointView<Eigen::Lower>().ldlt().solve(right_).eval();
   for (int r = 0; r < n; ++r) pairs[rows_[r].pair].impulse -= right_[r] * rows_[r].along;
   for (int p = 0; p < node.pair_count; ++p) give(pairs[p], pairs[p].impulse);
 }
@@ -208,7 +215,7 @@ double ContactSweep<Dim>::driven(const Node& node) const {
     const NodePair<Dim>& pair = pairs_[p];
     if (pair.face != pair.none)
       sum += pair.second.dot(wall_velocities_[pair.face]);
-    else if (partner.rigid)
+    else if (partner.rigid && pair.crack == pair.none)
       sum += pair.second.dot(partner.record.projected) / partner.mass;
   }
   return sum;

@@ -112,7 +112,7 @@ void ContactSweep<Dim>::keep_contacts(const Node& node, Patch<Dim>& patch, const
   for (int p = node.first_pair; p < node.first_pair + node.pair_count; ++p) {
     const NodePair<Dim>& pair = pairs_[p];
     const double size = node.share * pair.second.norm();
-    if (pair.face != pair.none || pair.a == node.partner || !(size > 0)) continue;
+    if (pair.face != pair.none || pair.crack != pair.none || pair.a == node.partner || !(size > 0)) continue;
     const int body = body_of(pair.a), other = body_of(node.partner);
     const double sign = body < other ? 1.0 : -1.0;  // impulse on the lower body, normal towards the higher
     double* sum = patch.contacts[std::minmax(body, other)].values.data();

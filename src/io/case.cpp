@@ -27,6 +27,7 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   if (!root.has("bodies") && !root.has("grains"))
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   read_drives(root, draft);
+  read_cracks(root, draft);
   check_pressures(draft, errors);
   read_boundary(root.table("boundary"), c.domain, c.faces);
   read_parallel(root.table("parallel"), c.parallel);

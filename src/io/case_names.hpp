@@ -33,6 +33,11 @@ inline constexpr Named<FaceType> face_type_names[] = {
     {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
 inline constexpr Named<Leaving> leaving_names[] = {{"remove", Leaving::remove}, {"stop", Leaving::stop}};
 inline constexpr Named<LostPoints> lost_points_names[] = {{"stop", LostPoints::stop}, {"drop", LostPoints::drop}};
+inline constexpr Named<CrackLaw> crack_law_names[] = {{"stick", CrackLaw::stick},
+                                                      {"friction", CrackLaw::friction},
+                                                      {"frictionless", CrackLaw::frictionless},
+                                                      {"free", CrackLaw::free}};
+inline constexpr Named<CrackEnd> crack_end_names[] = {{"open", CrackEnd::open}, {"tip", CrackEnd::tip}};
 inline constexpr Named<Surface> surface_names[] = {{"whole", Surface::whole}, {"cut", Surface::cut}};
 inline constexpr Named<NoiseFilter> noise_filter_names[] = {{"off", NoiseFilter::off},
                                                             {"weak", NoiseFilter::weak},

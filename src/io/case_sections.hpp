@@ -37,6 +37,8 @@ std::optional<Shape> read_shape(Table table, int dimension, Errors& errors);
 void read_bodies(Table& root, Draft& draft, Errors& errors);
 void read_grains(Table& root, Draft& draft, Errors& errors);
 void read_drives(Table& root, Draft& draft);
+/// [[cracks]] and [crack]; after bodies and contact.
+void read_cracks(Table& root, Draft& draft);
 
 /// Appends the balls of a grain table; returns the checksum of its bytes.
 std::uint64_t read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors);

@@ -237,6 +237,23 @@ void write_bodies(Writer& out, const Draft& draft) {
   }
 }
 
+void write_cracks(Writer& out, const Case& c) {
+  for (const auto& crack : c.cracks) {
+    out.section("[[cracks]]");
+    std::string points;
+    for (const Vec3& x : crack.points) points += (points.empty() ? "" : ", ") + list_of(x, c.domain.dimension);
+    out.raw("points", "[" + points + "]");
+    out.raw("ends", fmt::format("[\"{}\", \"{}\"]", name_of(crack_end_names, crack.ends[0]),
+                                name_of(crack_end_names, crack.ends[1])));
+    out.key("law", name_of(crack_law_names, crack.law));
+    if (crack.law == CrackLaw::friction) out.key("friction", crack.friction);
+    if (!crack.groups.empty()) out.raw("bodies", list_of(crack.groups, std::ssize(crack.groups)));
+  }
+  if (c.cracks.empty()) return;
+  out.section("[crack]");
+  out.raw("j_radius", list_of(c.crack.j_radius, 2));
+}
+
 void write_boundary(Writer& out, const Case& c) {
   out.section("[boundary]");
   for (int i = 0; i < 2 * c.domain.dimension; ++i) {
@@ -289,6 +306,7 @@ std::string write_case(const Draft& draft) {
   write_time_and_solver(out, c.time, c.solver);
   write_contact(out, c);
   write_bodies(out, draft);
+  write_cracks(out, c);
   write_boundary(out, c);
   write_parallel(out, c.parallel);
   write_output(out, c.output);

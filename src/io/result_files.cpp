@@ -21,8 +21,8 @@ namespace fs = std::filesystem;
 struct Numbered {
   std::string_view start, ending;
 };
-constexpr Numbered numbered[] = {
-    {"particles_", ".vtkhdf"}, {"grains_", ".h5"}, {"contacts_", ".h5"}, {"checkpoint_", ".h5"}};
+constexpr Numbered numbered[] = {{"particles_", ".vtkhdf"}, {"grains_", ".h5"}, {"contacts_", ".h5"},
+                                 {"cracks_", ".h5"},        {"tips_", ".h5"},   {"checkpoint_", ".h5"}};
 
 bool is_number(std::string_view text) {
   return !text.empty() && std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "cairn/parallel/communicator.hpp"
+#include "cairn/parallel/crack_exchange.hpp"
 
 namespace cairn {
 namespace {
@@ -41,6 +42,8 @@ void put_patch(const Patch<Dim>& patch, Message& message) {
                                                       [](const auto& piece) { return piece.points.size() > 0; })));
   for (const auto& piece : patch.pieces)
     if (piece.points.size() > 0) put_piece(piece, message);
+  message.put(static_cast<std::int64_t>(patch.cracks.size()));
+  for (const auto& point : patch.cracks) put_crack_point(point, message);
 }
 
 template <int Dim>
@@ -69,6 +72,7 @@ Patch<Dim> take_patch(const Message& message, std::size_t& at, const Lattice<Dim
       at += 2;
     }
   }
+  for (std::int64_t n = message.integer(at++); n > 0; --n) patch.cracks.push_back(take_crack_point<Dim>(message, at));
   return patch;
 }
 

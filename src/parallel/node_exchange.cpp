@@ -49,21 +49,58 @@ const double* unpack(NodeBox<Dim>& nodes, const Box<Dim>& box, const NodeQuantit
   return from;
 }
 
-/// Makes room for the nodes of `box`, which holds that of the nodes; the new ones have zeros.
+/// Lays the nodes out anew, over `box` and with the further rows given, which hold what there is; the new ones have
+/// zeros.
 template <int Dim>
-void widen(NodeBox<Dim>& nodes, const Box<Dim>& box, const std::vector<NodeQuantity<Dim>>& quantities) {
+void lay_out(NodeBox<Dim>& nodes, const Box<Dim>& box, std::vector<FurtherRow<Dim>> rows,
+             const std::vector<NodeQuantity<Dim>>& quantities) {
+  FurtherRows<Dim>& further = nodes.further;
+  const Box<Dim> old_box = nodes.box;
+  std::vector<int> moved;  // where each of the rows is now
+  for (std::size_t k = 0, at = 0; k < further.rows.size(); ++k) {
+    while (!(rows[at] == further.rows[k])) ++at;
+    moved.push_back(static_cast<int>(at));
+  }
+  further.rows = std::move(rows);
+  nodes.box = box;
+  const auto move_rows = [&](const double* from, AlignedDoubles& to, int width, std::size_t before) {
+    for (std::size_t k = 0; k < moved.size(); ++k, from += width)
+      std::copy_n(from, width, to.data() + (before + moved[k]) * width);
+  };
   for (const auto& q : quantities) {
     AlignedDoubles& values = nodes.*q.values;
     const AlignedDoubles old = values;
     const double* from = old.data();
-    values.assign(box.size() * q.width, 0.0);
-    for_each_row(nodes.box, box, [&](int first, int n) {
+    values.assign(nodes.storage() * q.width, 0.0);
+    for_each_row(old_box, box, [&](int first, int n) {
       std::copy_n(from, static_cast<std::size_t>(n) * q.width,
                   values.data() + static_cast<std::size_t>(first) * q.width);
       from += static_cast<std::size_t>(n) * q.width;
     });
+    move_rows(from, values, q.width, box.size());
   }
-  nodes.box = box;
+  const AlignedDoubles crossings = further.crossings;
+  further.crossings.assign(further.rows.size() * NodeCrossings<Dim>::width, 0.0);
+  move_rows(crossings.data(), further.crossings, NodeCrossings<Dim>::width, 0);
+  for (auto& point : further.points)
+    for (int& row : point.row)
+      if (row >= 0) row = moved[row];
+}
+
+/// Positions of the further rows that the piece's own points gave it at the nodes of `box`.
+template <int Dim>
+std::vector<int> own_rows(const NodeBox<Dim>& nodes, const Box<Dim>& box) {
+  std::vector<int> rows;
+  for (std::size_t k = 0; k < nodes.further.rows.size(); ++k)
+    if (nodes.further.rows[k].own && box.contains(nodes.further.rows[k].place)) rows.push_back(static_cast<int>(k));
+  return rows;
+}
+
+template <int Dim>
+void pack_rows(const NodeBox<Dim>& nodes, const std::vector<int>& rows, const NodeQuantity<Dim>& q, Message& message) {
+  for (const int k : rows)
+    std::copy_n((nodes.*q.values).data() + static_cast<std::size_t>(nodes.row_of(k)) * q.width, q.used,
+                message.extend(q.used));
 }
 
 template <int Dim>
@@ -71,6 +108,10 @@ Index<Dim> negated(Index<Dim> shift) {
   for (auto& s : shift) s = -s;
   return shift;
 }
+
+/// Numbers that a further row has in the message of the sums before its quantities: node, side set, crossings.
+template <int Dim>
+constexpr std::size_t row_head = Dim + 1 + NodeCrossings<Dim>::width;
 
 }  // namespace
 
@@ -120,9 +161,12 @@ void NodeExchange<Dim>::begin(AlignedDoubles NodeBox<Dim>::*values) {
 template <int Dim>
 void NodeExchange<Dim>::put(Patch<Dim>& patch, std::size_t p) {
   if (out_.with_boxes) return put_with_boxes(patch, p);
-  for (const Sent& sent : sent_[p])
-    pack(patch.piece_of(sent.body, 0).nodes, sent.box, out_.quantities[0],
-         messages_.outgoing(sent.rank).extend(sent.box.size() * out_.quantities[0].used));
+  for (const Sent& sent : sent_[p]) {
+    const NodeBox<Dim>& nodes = patch.piece_of(sent.body, 0).nodes;
+    Message& message = messages_.outgoing(sent.rank);
+    pack(nodes, sent.box, out_.quantities[0], message.extend(sent.box.size() * out_.quantities[0].used));
+    pack_rows(nodes, own_rows(nodes, sent.box), out_.quantities[0], message);
+  }
 }
 
 template <int Dim>
@@ -141,7 +185,18 @@ void NodeExchange<Dim>::put_with_boxes(Patch<Dim>& patch, std::size_t p) {
       message.put(std::int64_t{piece.body});
       for (int d = 0; d < Dim; ++d)
         message.put(std::int64_t{theirs.lower[d]}), message.put(std::int64_t{theirs.upper[d]});
+      const std::vector<int> further = own_rows(piece.nodes, box);
+      message.put(static_cast<std::int64_t>(further.size()));
       for (const auto& q : out_.quantities) pack(piece.nodes, box, q, message.extend(box.size() * q.used));
+      for (const int k : further) {
+        const FurtherRow<Dim>& row = piece.nodes.further.rows[k];
+        for (int d = 0; d < Dim; ++d) message.put(std::int64_t{row.place[d] - link.shift[d]});
+        message.put(row.sides.key());
+        constexpr int width = NodeCrossings<Dim>::width;
+        std::copy_n(piece.nodes.further.crossings.data() + static_cast<std::size_t>(k) * width, width,
+                    message.extend(width));
+      }
+      for (const auto& q : out_.quantities) pack_rows(piece.nodes, further, q, message);
     }
   }
 }
@@ -174,10 +229,14 @@ void NodeExchange<Dim>::parse(int rank) {
       part.box.lower[d] = static_cast<int>(message.integer(at++));
       part.box.upper[d] = static_cast<int>(message.integer(at++));
     }
+    part.further.resize(message.integer(at++));
     part.rank = rank, part.at = at, part.nodes_before = nodes;
-    nodes += part.box.size();
+    nodes += part.box.size() + part.further.size();
     for (const auto& q : in_.quantities) at += part.box.size() * q.used;
-    parts_of(patch).push_back(part);
+    part.rows_at = at;
+    at += part.further.size() * row_head<Dim>;
+    for (const auto& q : in_.quantities) at += part.further.size() * q.used;
+    parts_of(patch).push_back(std::move(part));
   }
 }
 
@@ -189,7 +248,7 @@ void NodeExchange<Dim>::add(Patch<Dim>& patch, std::size_t p) {
     std::size_t end = i;
     while (end < parts.size() && parts[end].body == parts[i].body) ++end;
     Piece<Dim>& piece = patch.piece_of(parts[i].body, 0);
-    if (in_.with_boxes && piece.points.size() == 0) piece.nodes.own = piece.nodes.box = {};
+    if (in_.with_boxes && piece.points.size() == 0) piece.nodes.own = piece.nodes.box = {}, piece.nodes.further.clear();
     add_to_piece(piece, patch.links_before, {&parts[i], end - i});
     i = end;
   }
@@ -202,18 +261,23 @@ void NodeExchange<Dim>::renew_ghosts(Patch<Dim>& patch, std::vector<Part>& parts
             [](const Part& a, const Part& b) { return std::pair(a.body, a.link) < std::pair(b.body, b.link); });
   std::erase_if(patch.pieces, [&](const Piece<Dim>& piece) {
     return piece.points.size() == 0 &&
-           !std::binary_search(parts.begin(), parts.end(), Part{0, piece.body, {}, 0, 0, 0},
+           !std::binary_search(parts.begin(), parts.end(), Part{0, piece.body, {}, 0, 0, 0, 0, {}},
                                [](const Part& a, const Part& b) { return a.body < b.body; });
   });
 }
 
 template <int Dim>
-void NodeExchange<Dim>::add_to_piece(Piece<Dim>& piece, int links_before, std::span<const Part> parts) const {
+void NodeExchange<Dim>::add_to_piece(Piece<Dim>& piece, int links_before, std::span<Part> parts) const {
   NodeBox<Dim>& nodes = piece.nodes;
   Box<Dim> box = nodes.box;
   if (in_.with_boxes)
     for (const Part& part : parts) box = hull(box, part.box);
-  if (!(box == nodes.box)) widen(nodes, box, in_.quantities);
+  const bool rows_come =
+      std::any_of(parts.begin(), parts.end(), [](const Part& part) { return !part.further.empty(); });
+  if (in_.with_boxes && rows_come)
+    receive_rows(nodes, box, parts);
+  else if (!(box == nodes.box))
+    lay_out(nodes, box, nodes.further.rows, in_.quantities);
   const auto own_place =
       std::find_if(parts.begin(), parts.end(), [&](const Part& p) { return p.link >= links_before; });
   const auto meets_another = [&](const Part& p) {
@@ -228,12 +292,72 @@ void NodeExchange<Dim>::add_to_piece(Piece<Dim>& piece, int links_before, std::s
     for (const auto& q : in_.quantities) {
       own.emplace_back(nodes.own.size() * q.used);
       pack(nodes, nodes.own, q, own.back().data());
-      std::fill((nodes.*q.values).begin(), (nodes.*q.values).end(), 0.0);
+      std::fill_n((nodes.*q.values).begin(), nodes.box.size() * q.width, 0.0);
     }
   for (auto part = parts.begin(); part != own_place; ++part) add_part(nodes, *part);
   if (own_waits)
     for (std::size_t i = 0; i < own.size(); ++i) unpack(nodes, nodes.own, in_.quantities[i], own[i].data());
   for (auto part = own_place; part != parts.end(); ++part) add_part(nodes, *part);
+  if (rows_come) add_rows(nodes, parts, own_place - parts.begin());
+}
+
+/// Makes the further rows that neighbours speak of, over `box`, and notes where those of each part are.
+template <int Dim>
+void NodeExchange<Dim>::receive_rows(NodeBox<Dim>& nodes, const Box<Dim>& box, std::span<Part> parts) const {
+  std::vector<FurtherRow<Dim>> rows = nodes.further.rows;
+  const auto read = [&](const Part& part, std::size_t k) {
+    const Message& message = messages_.incoming(part.rank);
+    const std::size_t at = part.rows_at + k * row_head<Dim>;
+    FurtherRow<Dim> row{{}, SideSet(message.integer(at + Dim)), false};
+    for (int d = 0; d < Dim; ++d) row.place[d] = static_cast<int>(message.integer(at + d));
+    return row;
+  };
+  for (const Part& part : parts)
+    for (std::size_t k = 0; k < part.further.size(); ++k) rows.push_back(read(part, k));
+  std::stable_sort(rows.begin(), rows.end());  // own ones stay before others of the same place and set
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  lay_out(nodes, box, std::move(rows), in_.quantities);
+  for (Part& part : parts)
+    for (std::size_t k = 0; k < part.further.size(); ++k) {
+      const auto row = read(part, k);
+      part.further[k] = nodes.further.find(row.place, row.sides);
+    }
+}
+
+/// Adds the further rows of the parts in order, with the piece's own after the first `parts_before`.
+template <int Dim>
+void NodeExchange<Dim>::add_rows(NodeBox<Dim>& nodes, std::span<const Part> parts, std::size_t parts_before) const {
+  const auto add = [&](double* rows, int width, int used, auto&& first_of, std::size_t step) {
+    const std::size_t size = nodes.further.rows.size() * width;
+    const std::vector<double> own(rows, rows + size);
+    std::fill_n(rows, size, 0.0);
+    for (std::size_t i = 0; i <= parts.size(); ++i) {
+      if (i == parts_before)
+        for (std::size_t c = 0; c < size; ++c) rows[c] += own[c];
+      if (i == parts.size()) break;
+      const double* from = first_of(parts[i]);
+      for (const int k : parts[i].further) {
+        for (int c = 0; c < used; ++c) rows[static_cast<std::size_t>(k) * width + c] += from[c];
+        from += step;
+      }
+    }
+  };
+  const auto message = [&](const Part& part, std::size_t at) { return messages_.incoming(part.rank).data(at); };
+  constexpr int width = NodeCrossings<Dim>::width;
+  if (in_.with_boxes)
+    add(
+        nodes.further.crossings.data(), width, width,
+        [&](const Part& part) { return message(part, part.rows_at + Dim + 1); }, row_head<Dim>);
+  std::size_t before = 0;  // numbers of the quantities before, for each row
+  for (const auto& q : in_.quantities) {
+    const auto first_of = [&](const Part& part) {
+      const std::size_t n = part.further.size();
+      return in_.with_boxes ? message(part, part.rows_at + n * (row_head<Dim> + before))
+                            : message(part, (part.nodes_before + part.box.size()) * q.used);
+    };
+    add((nodes.*q.values).data() + nodes.box.size() * q.width, q.width, q.used, first_of, q.used);
+    before += q.used;
+  }
 }
 
 template <int Dim>

@@ -45,11 +45,30 @@ inline constexpr const char* numbers_checksum_name = "numbers_checksum";  // of 
 /// Rows of every patch in some table.
 using Counts = std::vector<std::int64_t>;
 
+/// What the file holds of crack points besides their numbers.
+template <int Dim>
+struct CrackVector {
+  const char* name;
+  Vec<Dim> CrackPoint<Dim>::*value;
+};
+template <int Dim>
+inline constexpr CrackVector<Dim> crack_vectors[] = {{"crack_plane", &CrackPoint<Dim>::plane},
+                                                     {"crack_lower", &CrackPoint<Dim>::lower},
+                                                     {"crack_upper", &CrackPoint<Dim>::upper},
+                                                     {"crack_lower_velocity", &CrackPoint<Dim>::lower_velocity},
+                                                     {"crack_upper_velocity", &CrackPoint<Dim>::upper_velocity}};
+inline constexpr int crack_numbers = 6;  // crack, index, filled, image
+inline constexpr const char* patch_cracks_name = "patch_cracks";
+/// Columns that a case with cracks has more.
+template <int Dim>
+inline constexpr int crack_columns = 2 + static_cast<int>(std::size(crack_vectors<Dim>));
+
 /// The patches that a checkpoint holds: those of which something has to be remembered.
 struct Layout {
   std::vector<PatchId> patches;            // ascending
   Counts points, pieces, contacts, tools;  // of each
   std::vector<std::size_t> here;           // places in the list of those of this rank, ascending
+  Counts cracks = {};                      // crack points; there is no such table where the case has no cracks
 
   Counts one_each() const { return Counts(patches.size(), 1); }
   /// Rows of a table in patch order that belong to this rank's patches.

@@ -198,6 +198,39 @@ void read_points(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lay
   in.settle();
 }
 
+template <int Dim>
+void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout,
+                 const std::vector<Crack>& cracks) {
+  if (layout.cracks.empty()) return;
+  in.template read_patches<std::int64_t>(patch_cracks_name);
+  const auto numbers = in.template read<std::int32_t>("crack_numbers", crack_numbers, layout.cracks);
+  in.settle();
+  const std::int32_t* n = numbers.data();
+  for (std::size_t at = 0; at < patches.size(); ++at)
+    for (std::int64_t i = 0; i < layout.cracks[layout.here[at]]; ++i, n += crack_numbers) {
+      Patch<Dim>& patch = *patches[at];
+      CrackPoint<Dim> point;
+      point.crack = n[0], point.index = n[1], point.filled = n[2] != 0;
+      for (int d = 0; d < 3; ++d) point.image[d] = n[3 + d];
+      const bool known =
+          n[0] >= 0 && n[0] < std::ssize(cracks) && n[1] >= cracks[n[0]].ends[0] && n[1] <= cracks[n[0]].ends[1];
+      in.require(known, fmt::format("it holds point {} of crack {}, which the case does not have", n[1], n[0]));
+      in.require(patch.cracks.empty() || patch.cracks.back() < point,
+                 fmt::format("the crack points of patch {} are not in their order", patch.id));
+      patch.cracks.push_back(point);
+    }
+  for (const auto& vector : crack_vectors<Dim>) {
+    const auto values = in.template read<double>(vector.name, Dim, layout.cracks);
+    const double* from = values.data();
+    for (auto* patch : patches)
+      for (auto& point : patch->cracks) {
+        for (int d = 0; d < Dim; ++d) (point.*vector.value)[d] = *from++;
+        in.require((point.*vector.value).allFinite(), "it holds crack points that are not finite");
+      }
+  }
+  in.settle();
+}
+
 /// Each point is there once, and where it can be.
 template <int Dim>
 void check_points(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lattice<Dim>& lattice) {
@@ -267,6 +300,11 @@ Checkpoint::Checkpoint(const std::filesystem::path& file, MPI_Comm comm)
   reader_.require(rows == reader_.table().rows() ? "" : "damaged: it has more or fewer points than it says");
   reader_.require(problem_of("patch_points", points_, rows));
   reader_.require(problem_of("patch_pieces", pieces_, reader_.rows_of("piece_body")));
+  if (reader_.table().rows_of(patch_cracks_name) >= 0) {
+    cracks_ = reader_.column<std::int64_t>(patch_cracks_name);
+    reader_.require(cracks_.size() == points_.size() ? "" : "damaged: the tables of patches do not fit together");
+    reader_.require(problem_of(patch_cracks_name, cracks_, reader_.rows_of("crack_numbers")));
+  }
   reader_.require(problem_of("patch_contacts", contacts_, reader_.rows_of("contact_bodies")));
   reader_.require(problem_of("patch_tools", tools_, reader_.rows_of("tool_number")));
 }
@@ -289,26 +327,29 @@ void Checkpoint::check_layout(const Lattice<Dim>& lattice) const {
 
 template <int Dim>
 void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
-                      const std::vector<SolverMaterial>& materials) const {
-  Layout layout{patches_, points_, pieces_, contacts_, tools_, {}};
+                      const std::vector<SolverMaterial>& materials, const std::vector<Crack>& cracks) const {
+  Layout layout{patches_, points_, pieces_, contacts_, tools_, {}, cracks_};
+  reader_.require(cracks_.empty() == cracks.empty() ? "" : "it has cracks where the case has none, or the other way");
   const PatchList<Dim> held = layout.find(patches);
   const int states = most_states(materials);
   constexpr int columns_besides_quantities = 14 + static_cast<int>(std::size(ledger_columns));
-  const int columns = columns_besides_quantities + static_cast<int>(quantities<Dim>(states).size());
+  const int columns = columns_besides_quantities + static_cast<int>(quantities<Dim>(states).size()) +
+                      (cracks.empty() ? 0 : crack_columns<Dim>);
   ColumnReader<Dim> in(reader_, held, layout, columns);
   read_ledgers(in, held);
   read_pieces(in, held, layout, bodies, materials);
   read_contacts(in, held, layout, bodies.size());
   read_tools(in, held, layout, state_.tools.size() / tool_state_size);
   read_points(in, held, layout, states);
+  read_cracks(in, held, layout, cracks);
   check_points(in, held, lattice);
 }
 
 template void Checkpoint::check_layout(const Lattice<2>&) const;
 template void Checkpoint::check_layout(const Lattice<3>&) const;
 template void Checkpoint::fill(std::vector<Patch<2>>&, const Lattice<2>&, const std::vector<Body>&,
-                               const std::vector<SolverMaterial>&) const;
+                               const std::vector<SolverMaterial>&, const std::vector<Crack>&) const;
 template void Checkpoint::fill(std::vector<Patch<3>>&, const Lattice<3>&, const std::vector<Body>&,
-                               const std::vector<SolverMaterial>&) const;
+                               const std::vector<SolverMaterial>&, const std::vector<Crack>&) const;
 
 }  // namespace cairn

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <bit>
 #include <numeric>
 #include <type_traits>
@@ -79,6 +80,15 @@ Layout layout_of(const Simulation<Dim>& simulation) {
     layout.points.push_back(count[points]), layout.pieces.push_back(count[pieces]);
     layout.contacts.push_back(count[contacts]), layout.tools.push_back(count[tools]);
   }
+  if (simulation.cracks().empty()) return layout;
+  layout.cracks.assign(layout.patches.size(), 0);
+  for (const auto& patch : simulation.patches()) {
+    const auto at = std::ranges::lower_bound(layout.patches, patch.id);
+    if (at != layout.patches.end() && *at == patch.id)
+      layout.cracks[at - layout.patches.begin()] = std::ranges::count_if(patch.cracks, &CrackPoint<Dim>::own);
+  }
+  MPI_Allreduce(MPI_IN_PLACE, layout.cracks.data(), static_cast<int>(layout.cracks.size()), MPI_INT64_T, MPI_SUM,
+                simulation.communicator());
   return layout;
 }
 
@@ -154,6 +164,32 @@ void write_points(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const L
   }
 }
 
+template <int Dim>
+void write_cracks(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const Layout& layout) {
+  if (layout.cracks.empty()) return;
+  std::vector<std::int32_t> numbers;
+  std::vector<double> values;
+  const auto for_own = [&](auto&& f) {
+    for (const auto* patch : patches)
+      for (const auto& point : patch->cracks)
+        if (point.own) f(point);
+  };
+  for_own([&](const CrackPoint<Dim>& p) {
+    numbers.insert(numbers.end(), {p.crack, p.index, p.filled, p.image[0], p.image[1], p.image[2]});
+  });
+  out.template write_patches<std::int64_t>(patch_cracks_name,
+                                           [&](const auto& patch) { return layout.cracks[patch.id]; });
+  out.write("crack_numbers", crack_numbers, layout.cracks, numbers);
+  for (const auto& vector : crack_vectors<Dim>) {
+    values.clear();
+    for_own([&](const CrackPoint<Dim>& p) {
+      const Vec<Dim>& v = p.*vector.value;
+      values.insert(values.end(), v.data(), v.data() + Dim);
+    });
+    out.write(vector.name, Dim, layout.cracks, values);
+  }
+}
+
 /// A table that every rank knows and rank 0 writes.
 void write_on_first(CheckpointWriter& writer, const char* name, int components, const std::vector<double>& values,
                     MPI_Comm comm) {
@@ -209,6 +245,7 @@ void write_checkpoint(const std::filesystem::path& file, const Simulation<Dim>& 
   ColumnWriter<Dim> out(writer, patches, layout);
   write_patches(out, patches, layout);
   write_points(out, patches, layout, states);
+  write_cracks(out, patches, layout);
   out.write_checksums();
   writer.finish();
 }

@@ -1,6 +1,7 @@
 #include "cairn/solver/output.hpp"
 
 #include <deque>
+#include <numeric>
 
 #include "cairn/io/table_file.hpp"
 #include "cairn/solver/body_states.hpp"
@@ -40,12 +41,12 @@ class Columns {
   std::vector<std::tuple<std::string, int, Values>> columns_;
 };
 
-/// Rows of the points of this rank's patches: in the file they lie in patch order. Collective.
-template <int Dim>
-RowBlocks point_rows(const Simulation<Dim>& simulation) {
+/// Rows of this rank's patches, of which each has count_of(patch): in the file they lie in patch order. Collective.
+template <int Dim, class F>
+RowBlocks patch_rows(const Simulation<Dim>& simulation, F&& count_of) {
   const PatchTable<Dim>& table = simulation.table();
   std::vector<std::int64_t> counts(table.size(), 0);
-  for (const auto& patch : simulation.patches()) counts[table.find(patch.id)] = patch.point_count();
+  for (const auto& patch : simulation.patches()) counts[table.find(patch.id)] = count_of(patch);
   MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM,
                 simulation.communicator());
   RowBlocks rows;
@@ -56,6 +57,11 @@ RowBlocks point_rows(const Simulation<Dim>& simulation) {
       ++patch;
     }
   return rows;
+}
+
+template <int Dim>
+RowBlocks point_rows(const Simulation<Dim>& simulation) {
+  return patch_rows(simulation, [](const Patch<Dim>& patch) { return patch.point_count(); });
 }
 
 /// Rows of a table of which each rank holds a consecutive part. Collective.
@@ -200,6 +206,62 @@ void write_particles(Simulation<Dim>& simulation, const std::filesystem::path& f
 }
 
 template <int Dim>
+void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path& file) {
+  Columns columns;
+  auto& position = columns.add_doubles("position", 3);
+  auto& lower = columns.add_doubles("lower", 3);
+  auto& upper = columns.add_doubles("upper", 3);
+  auto& opening = columns.add_doubles("opening", 3);
+  auto& crack = columns.add_ints("crack", 1);
+  auto& index = columns.add_ints("index", 1);
+  auto& image = columns.add_ints("image", 3);
+  const auto padded = [](const Vec<Dim>& v) {
+    Vec3 p = Vec3::Zero();
+    p.template head<Dim>() = v;
+    return p;
+  };
+  for (const auto& patch : simulation.patches())
+    for (const auto& p : patch.cracks) {
+      if (!p.own) continue;
+      append(position, padded(p.plane)), append(lower, padded(p.lower)), append(upper, padded(p.upper));
+      append(opening, padded(p.opening()));
+      crack.push_back(p.crack), index.push_back(p.index);
+      for (int d = 0; d < 3; ++d) image.push_back(d < Dim ? p.image[d] : 0);
+    }
+  const RowBlocks rows = patch_rows(
+      simulation, [](const Patch<Dim>& patch) { return std::ranges::count_if(patch.cracks, &CrackPoint<Dim>::own); });
+  write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(),
+               "crack points");
+}
+
+template <int Dim>
+void write_tips(Simulation<Dim>& simulation, const std::filesystem::path& file) {
+  const auto states = simulation.tip_states();
+  int rank = 0;
+  MPI_Comm_rank(simulation.communicator(), &rank);
+  Columns columns;
+  auto& position = columns.add_doubles("position", 3);
+  auto& ahead = columns.add_doubles("ahead", 3);
+  auto& crack = columns.add_ints("crack", 1);
+  auto& end = columns.add_ints("end", 1);
+  std::array<std::vector<double>*, 4> numbers{};
+  constexpr const char* names[] = {"J", "J_static", "K_I", "K_II"};
+  for (int i = 0; i < 4; ++i) numbers[i] = &columns.add_doubles(names[i], 1);
+  RowBlocks rows{{}, std::ssize(states)};
+  if (rank == 0 && !states.empty()) rows.blocks.push_back({0, rows.total_rows});
+  for (const TipState& s : states) {
+    if (rank != 0) break;
+    append(position, Vec3(s.tip.position.x(), s.tip.position.y(), 0));
+    append(ahead, Vec3(s.tip.ahead.x(), s.tip.ahead.y(), 0));
+    crack.push_back(s.tip.crack), end.push_back(s.tip.end);
+    const double values[] = {s.J, s.J_static, s.K_opening, s.K_sliding};
+    for (int i = 0; i < 4; ++i) numbers[i]->push_back(values[i]);
+  }
+  write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(),
+               "tips of cracks");
+}
+
+template <int Dim>
 void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path& file) {
   const auto states = body_states(simulation);
   Columns columns;
@@ -245,6 +307,8 @@ void write_contacts(const Simulation<Dim>& simulation, const std::filesystem::pa
 
 #define CAIRN_INSTANTIATE(Dim)                                                                                    \
   template void write_particles(Simulation<Dim>&, const std::filesystem::path&, const std::vector<std::string>&); \
+  template void write_cracks(const Simulation<Dim>&, const std::filesystem::path&);                               \
+  template void write_tips(Simulation<Dim>&, const std::filesystem::path&);                                       \
   template void write_grains(const Simulation<Dim>&, const std::filesystem::path&);                               \
   template void write_contacts(const Simulation<Dim>&, const std::filesystem::path&, double);
 CAIRN_INSTANTIATE(2)

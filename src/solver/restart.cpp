@@ -153,10 +153,9 @@ std::unique_ptr<Checkpoint> open_restart(const Case& c, const RunSettings& setti
 std::string remove_later(const fs::path& out, const RunState& state, const fs::path& checkpoint) {
   std::error_code ignored;
   fs::remove(out / failure_file, ignored);
-  const std::pair<const char*, std::int64_t> kinds[] = {{"particles", state.particles.count},
-                                                        {"grains", state.grains.count},
-                                                        {"contacts", state.contacts.count},
-                                                        {"checkpoint", state.checkpoint.count}};
+  const std::pair<const char*, std::int64_t> kinds[] = {
+      {"particles", state.particles.count}, {"grains", state.grains.count},  {"contacts", state.contacts.count},
+      {"cracks", state.particles.count},    {"tips", state.particles.count}, {"checkpoint", state.checkpoint.count}};
   for (const auto& [kind, count] : kinds)
     for (const auto& [number, file] : numbered_files(out, kind)) {
       std::error_code error;

@@ -217,6 +217,7 @@ class Run {
       const std::string file = name("particles", particles_);
       write_particles(simulation_, next_result(file), case_.output.particles.fields);
       particle_index_.add(file, time, comm_);
+      if (!case_.cracks.empty()) write_crack_files(name("cracks", particles_), name("tips", particles_));
     }
     const bool grains = wanted(grains_), contacts = wanted(contacts_);
     if (grains) write_grains(simulation_, next_result(name("grains", grains_)));
@@ -224,6 +225,12 @@ class Run {
     if (contacts || (grains && !contacts_.active())) simulation_.clear_contacts(), contacts_cleared_ = time;
     if (step == 0) checkpoints_.skip(step, time, wall);  // nothing is lost by starting again
     if (wanted(checkpoints_)) write_checkpoint_file(true);
+  }
+
+  void write_crack_files(const std::string& cracks, const std::string& tips) {
+    write_cracks(simulation_, next_result(cracks));
+    const auto has_tip = [](const CrackSpec& c) { return c.ends[0] == CrackEnd::tip || c.ends[1] == CrackEnd::tip; };
+    if (std::ranges::any_of(case_.cracks, has_tip)) write_tips(simulation_, next_result(tips));
   }
 
   /// The path of a result file that is to be written.

@@ -333,6 +333,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
     }
   const bool walls = std::ranges::any_of(contact_.faces, [](const auto& f) { return f.type == FaceType::wall; });
   transfer_.normals_needed = walls || (bodies_.size() > 1 && transfer_.normals_needed);  // something to touch
+  define_cracks(c);
   transfer_of_turning_ = transfer_;
   transfer_of_turning_.spin = true;
   if (from)
@@ -341,7 +342,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
     place_points(c);
   // As at the end of a step; and the memory of the nodes is there before the first step.
   for (auto& patch : patches_)
-    for (auto& piece : patch.pieces) project_ahead(piece);
+    for (auto& piece : patch.pieces) project_ahead(patch, piece);
 }
 
 template <int Dim>
@@ -368,8 +369,9 @@ void Simulation<Dim>::restore(const Checkpoint& from) {
   for (std::size_t p = 0; p < from.patches().size(); ++p)
     if (from.points()[p] > 0) filled.push_back(from.patches()[p]), points.push_back(from.points()[p]);
   make_patches(filled, points, from.patches());
-  from.fill(patches_, lattice_, bodies_, materials_);
+  from.fill(patches_, lattice_, bodies_, materials_, cracks_);
   connect_patches();
+  receive_cracks();
   const StepState& state = from.state().step;
   time_ = state.time, dt_ = state.dt, steps_ = state.steps;
   restore_tools(from.state().tools);
@@ -396,7 +398,7 @@ void Simulation<Dim>::place_points(const Case& c) {
   std::vector<std::int64_t> points;
   for (std::size_t p = 0; p < reached.size(); ++p)
     if (count[p] > 0) filled.push_back(reached[p]), points.push_back(count[p]);
-  make_patches(filled, points, {});
+  make_patches(filled, points, patches_of_cracks(c));
 
   std::int64_t first_id = 0;
   auto patch = patches_.begin();
@@ -406,6 +408,7 @@ void Simulation<Dim>::place_points(const Case& c) {
     filler.fill(*patch, first_id);
   }
   connect_patches();
+  place_cracks(c);
 
   using C = PointColumns<Dim>;
   for (auto& patch : patches_)

@@ -113,21 +113,30 @@ void Simulation<Dim>::choose_time_step(double longest) {
 template <int Dim>
 void Simulation<Dim>::project_points(Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::project);
+  find_cracks(patch);
   for (auto& piece : patch.pieces)
-    if (!std::exchange(piece.projected, false)) project_piece(piece);
+    if (!std::exchange(piece.projected, false)) project_piece(patch, piece);
+}
+
+/// The node box, and the rows of the sides of cracks.
+template <int Dim>
+void Simulation<Dim>::lay_out(Patch<Dim>& patch, Piece<Dim>& piece) {
+  lay_out_nodes(piece, lattice_, transfer_);
+  if (!patch.cracks.empty() && !is_rigid(piece)) find_sides(piece, segments_of(patch), cracks_, lattice_);
 }
 
 template <int Dim>
-void Simulation<Dim>::project_piece(Piece<Dim>& piece) {
-  lay_out_nodes(piece, lattice_, transfer_);
+void Simulation<Dim>::project_piece(Patch<Dim>& patch, Piece<Dim>& piece) {
+  lay_out(patch, piece);
   project(piece, lattice_, transfer_of(piece), material_of(piece).density);
 }
 
-/// Projects a piece for the step that comes next.
+/// Projects a piece for the step that comes next, unless there are cracks whose places then are not known yet.
 template <int Dim>
-void Simulation<Dim>::project_ahead(Piece<Dim>& piece) {
+void Simulation<Dim>::project_ahead(Patch<Dim>& patch, Piece<Dim>& piece) {
+  if (!patch.cracks.empty()) return;
   const auto time = timers_.measure(Stage::project);
-  project_piece(piece);
+  project_piece(patch, piece);
   piece.projected = true;
 }
 
@@ -220,13 +229,15 @@ template <int Dim>
 void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
   using C = PointColumns<Dim>;
   const bool strained = solver_.stress_update == StressUpdate::first;
+  if (!patch.cracks.empty())
+    face_motions_[&patch - patches_.data()] = find_face_velocities(patch.cracks, surroundings_of(patch));
   const auto time = timers_.measure(strained ? Stage::update : Stage::stress);
   for_pieces(patch, {{C::position, strained ? C::state : all_columns}}, [&](Piece<Dim>& piece) {
     finish_piece(patch, piece, share);
     patch.ledger.stopped += static_cast<double>(std::exchange(speeds_.stopped, 0));
     if (!projects_again()) motions_.take_back(piece.nodes.motion), velocities_.take_back(piece.nodes.velocity);
     if (!marked_ && all_inside(piece, lattice_, patch.id)) {
-      project_ahead(piece);
+      project_ahead(patch, piece);
     } else {
       const auto time = timers_.measure(Stage::migrate);
       migration_->collect(patch, piece, lattice_);
@@ -302,6 +313,7 @@ void Simulation<Dim>::receive_points() {
   start_speed_reduction();
   migration_->finish(patches_);
   marked_ = false;
+  move_cracks();
   if ((steps_ + 1) % sort_interval == 0)
     for (auto& patch : patches_)
       for (auto& piece : patch.pieces) sort_by_cell(piece, lattice_, patch.cells);
@@ -407,7 +419,8 @@ void Simulation<Dim>::connect_patches() {
     for (const auto& link : patch.links)
       if (table_.find(link.patch) >= 0) neighbours.insert(table_.owner(link.patch));
   neighbours.erase(rank_);
-  sweeps_.assign(patches_.size(), {});
+  sweeps_.assign(patches_.size(), {}), segments_.assign(patches_.size(), {});
+  face_motions_.assign(patches_.size(), {});
   const Traffic traffic = messages_ ? messages_->traffic() : Traffic{};
   messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
   messages_->traffic() = traffic;

@@ -7,9 +7,10 @@ void Simulation<Dim>::project_stress() {
   finish_speed_reduction();  // patches that points entered have their neighbours then
   exchange_->begin_with_boxes({{&NodeBox<Dim>::sums, NodeStress<Dim>::width, NodeStress<Dim>::used}});
   exchange_after([&](std::size_t, Patch<Dim>& patch) {
+    find_cracks(patch);
     for (auto& piece : patch.pieces) {
       piece.projected = false;
-      lay_out_nodes(piece, lattice_, transfer_);
+      lay_out(patch, piece);
       cairn::project_stress(piece, lattice_, transfer_);
     }
   });

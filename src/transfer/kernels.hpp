@@ -8,6 +8,7 @@
 
 #include "cairn/grid/shape_functions.hpp"
 #include "cairn/transfer/transfer.hpp"
+#include "cut_blocks.hpp"
 
 namespace cairn::kernels {
 
@@ -47,6 +48,32 @@ void for_chunks(const Points<Dim>& points, const Lattice<Dim>& lattice, const Bo
     const Stencil<Dim, Shape> stencil(lattice, shape, box, x);
     f(first, std::min(lane_count, points.size() - first), stencil);
   }
+}
+
+/// As above, for a piece of which some points see nodes across cracks.
+template <int Dim, class Shape, class F>
+[[gnu::noinline]] void for_cut_chunks(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const Shape& shape,
+                                      std::initializer_list<RowArray> arrays, F&& f) {
+  const Points<Dim>& points = piece.points;
+  CutBlocks<Dim> blocks(piece.nodes, arrays, Shape::nodes);
+  for (int first = 0; first < points.size(); first += lane_count) {
+    const double* x[Dim];
+    for (int d = 0; d < Dim; ++d) x[d] = points.column(d) + first;
+    Stencil<Dim, Shape> stencil(lattice, shape, piece.nodes.box, x);
+    const int count = std::min(lane_count, points.size() - first);
+    const bool cut = blocks.reach(first);
+    if (cut) blocks.enter(count, stencil.first, stencil.stride);
+    f(first, count, std::as_const(stencil));
+    if (cut) blocks.leave();
+  }
+}
+
+/// As above, for the points and nodes of a piece. `arrays` are those that f reads of the nodes, and those it adds to.
+template <int Dim, class Shape, class F>
+void for_chunks(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const Shape& shape,
+                std::initializer_list<RowArray> arrays, F&& f) {
+  if (piece.nodes.further.scratch > 0) return for_cut_chunks(piece, lattice, shape, arrays, f);
+  for_chunks(piece.points, lattice, piece.nodes.box, shape, f);
 }
 
 /// Calls f(s, i, j) for every component s of a spin, which turns direction i towards j.

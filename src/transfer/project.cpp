@@ -31,10 +31,11 @@ void project_normals(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Trans
   using N = NodeSums<Dim>;
   constexpr int half = row_width<Lanes4>, gradient = N::gradient - half;  // it lies in the second half of a row
   double* sums = piece.nodes.sums.data();
-  for (std::size_t node = 0; node < piece.nodes.box.size(); ++node)
+  for (std::size_t node = 0; node < piece.nodes.rows(); ++node)
     std::fill_n(sums + node * N::width + N::gradient, Dim, 0.0);
   with_normal_shape(settings, [&](const auto& shape) {
-    for_chunks(piece.points, lattice, piece.nodes.box, shape, [&](int first, int count, const auto& stencil) {
+    const auto arrays = {add_rows(piece.nodes.sums, N::width)};
+    for_chunks(piece, lattice, shape, arrays, [&](int first, int count, const auto& stencil) {
       alignas(64) double share[lane_count];
       const Lanes volume0 = load(piece.points.column(C::volume) + first);
       store(share, volume0 * (settings.normals.by_mass ? broadcast(density)
@@ -54,7 +55,7 @@ void project_extras(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transf
   using C = PointColumns<Dim>;
   using E = NodeExtras<Dim>;
   const Box<Dim>& box = piece.nodes.box;
-  piece.nodes.extras.assign(box.size() * E::width, 0.0);
+  piece.nodes.extras.assign(piece.nodes.storage() * E::width, 0.0);
   with_shape(settings, [&](const auto& shape) {
     for_chunks(piece.points, lattice, box, shape, [&](int first, int count, const auto& stencil) {
       const PointForce<Dim> stress(piece.points, first, 0, Vec<Dim>::Zero());
@@ -141,16 +142,18 @@ TransferSettings<Dim> TransferSettings<Dim>::make(const SolverOptions& solver, c
 template <int Dim>
 void lay_out_nodes(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings) {
   piece.nodes.own = piece.nodes.box = touched_nodes(piece.points, lattice, settings);
+  if (!piece.nodes.further.rows.empty()) piece.nodes.further.clear();
 }
 
 template <int Dim>
 void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density) {
   NodeBox<Dim>& nodes = piece.nodes;
-  nodes.sums.assign(nodes.box.size() * NodeSums<Dim>::width, 0.0);
-  nodes.force.assign(nodes.box.size() * vector_width, 0.0);
+  nodes.sums.assign(nodes.storage() * NodeSums<Dim>::width, 0.0);
+  nodes.force.assign(nodes.storage() * vector_width, 0.0);
   const bool own_weights = settings.normals.weights == NormalSettings::Weights::of_shape;
   with_moving_shape(settings, [&](const auto& shape) {
-    for_chunks(piece.points, lattice, nodes.box, shape, [&](int first, int count, const auto& stencil) {
+    const auto arrays = {add_rows(nodes.sums, NodeSums<Dim>::width), add_rows(nodes.force, vector_width)};
+    for_chunks(piece, lattice, shape, arrays, [&](int first, int count, const auto& stencil) {
       scatter_sums(piece.points, first, count, stencil, density, settings.normals.by_mass, nodes.sums.data());
       const PointForce<Dim> force(piece.points, first, density, settings.gravity);
       for (int lane = 0; lane < count; ++lane) force.scatter(stencil, lane, nodes.force.data());

@@ -10,9 +10,9 @@ void project_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transf
   using N = NodeStress<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
   const Points<Dim>& points = piece.points;
-  nodes.sums.assign(nodes.box.size() * N::width, 0.0);
+  nodes.sums.assign(nodes.storage() * N::width, 0.0);
   with_shape(settings, [&](const auto& shape) {
-    for_chunks(points, lattice, nodes.box, shape, [&](int first, int count, const auto& stencil) {
+    for_chunks(piece, lattice, shape, {add_rows(nodes.sums, N::width)}, [&](int first, int count, const auto& stencil) {
       alignas(64) double volume[lane_count];
       store(volume, load(points.column(C::volume) + first) * determinant(load_deformation(points, first)));
       for (int lane = 0; lane < count; ++lane) {
@@ -33,16 +33,17 @@ std::vector<std::array<double, symmetric_size<Dim>>> smooth_stress(const Piece<D
   std::vector<std::array<double, symmetric_size<Dim>>> smooth(piece.points.size());
   const double* rows = piece.nodes.sums.data();
   with_shape(settings, [&](const auto& shape) {
-    for_chunks(piece.points, lattice, piece.nodes.box, shape, [&](int first, int count, const auto& stencil) {
-      for (int lane = 0; lane < count; ++lane) {
-        Lanes sum{};
-        stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) {
-          const Lanes row = load(rows + static_cast<std::size_t>(node) * N::width);
-          if (row[N::volume] > 0) sum += row * (w / row[N::volume]);
-        });
-        for (int i = 0; i < symmetric_size<Dim>; ++i) smooth[first + lane][i] = sum[N::stress + i];
-      }
-    });
+    for_chunks(piece, lattice, shape, {read_rows(piece.nodes.sums, N::width)},
+               [&](int first, int count, const auto& stencil) {
+                 for (int lane = 0; lane < count; ++lane) {
+                   Lanes sum{};
+                   stencil.for_nodes(lane, [&](int node, double w, const double(&)[Dim]) {
+                     const Lanes row = load(rows + static_cast<std::size_t>(node) * N::width);
+                     if (row[N::volume] > 0) sum += row * (w / row[N::volume]);
+                   });
+                   for (int i = 0; i < symmetric_size<Dim>; ++i) smooth[first + lane][i] = sum[N::stress + i];
+                 }
+               });
   });
   return smooth;
 }

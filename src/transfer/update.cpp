@@ -120,6 +120,16 @@ struct Walls {
   }
 };
 
+/// a b + c with one rounding where the machine can. Left to the compiler it would depend on the code around, and the
+/// time step on it.
+inline double multiply_add(double a, double b, double c) {
+#ifdef FP_FAST_FMA
+  return std::fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+
 /// x_p += dt sum N v, up to the walls; returns the larger of `fastest` and its squared speed, infinite where that is
 /// not finite.
 template <int Dim>
@@ -133,23 +143,42 @@ double move(Points<Dim>& points, int p, const PointMotion<Dim>& m, const Walls<D
     x = walls.stop(d, x, free);
     stopped += x != free && free == free;
     const double v = points.column(C::velocity + d)[p];
-    squared += v * v;
+    squared = multiply_add(v, v, squared);
   }
   return squared <= std::numeric_limits<double>::max() ? std::max(fastest, squared)
                                                        : std::numeric_limits<double>::infinity();
 }
 
-/// Calls f(first, count, stencil) for every eight points of the piece on its whole node box.
+/// Calls f(first, count, stencil) for every eight points of the piece; `arrays` as in for_chunks.
 template <int Dim, class F>
-void for_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, F&& f) {
-  with_shape(settings, [&](const auto& shape) { for_chunks(piece.points, lattice, piece.nodes.box, shape, f); });
+void for_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
+               std::initializer_list<RowArray> arrays, F&& f) {
+  with_shape(settings, [&](const auto& shape) { for_chunks(piece, lattice, shape, arrays, f); });
 }
 
 /// As for_piece, with spin where points carry it.
 template <int Dim, class F>
 void for_moving_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
-                      F&& f) {
-  with_moving_shape(settings, [&](const auto& shape) { for_chunks(piece.points, lattice, piece.nodes.box, shape, f); });
+                      std::initializer_list<RowArray> arrays, F&& f) {
+  with_moving_shape(settings, [&](const auto& shape) { for_chunks(piece, lattice, shape, arrays, f); });
+}
+
+/// The arrays of nodes that passes read or add to.
+template <int Dim>
+RowArray velocity_of(Piece<Dim>& piece) {
+  return read_rows(piece.nodes.velocity, vector_width);
+}
+template <int Dim>
+RowArray motion_of(Piece<Dim>& piece) {
+  return read_rows(piece.nodes.motion, NodeMotion<Dim>::width);
+}
+template <int Dim>
+RowArray to_momentum_of(Piece<Dim>& piece) {
+  return add_rows(piece.nodes.velocity, vector_width);
+}
+template <int Dim>
+RowArray to_force_of(Piece<Dim>& piece) {
+  return add_rows(piece.nodes.force, vector_width);
 }
 
 }  // namespace
@@ -162,14 +191,15 @@ void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, cons
   std::visit(
       [&](const auto& any) {
         const auto& concrete = law_of_step(any, strain_dt);
-        for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-          const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), strain_dt);
-          fastest_wave = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest_wave);
-          for (int lane = 0; lane < count; ++lane) {
-            const auto m = gather_motion(stencil, lane, piece.nodes.motion.data());
-            fastest_point = move(piece.points, first + lane, m, walls, dt, fastest_point, speeds.stopped);
-          }
-        });
+        for_piece(piece, lattice, settings, {velocity_of(piece), motion_of(piece)},
+                  [&](int first, int count, const auto& stencil) {
+                    const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), strain_dt);
+                    fastest_wave = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest_wave);
+                    for (int lane = 0; lane < count; ++lane) {
+                      const auto m = gather_motion(stencil, lane, piece.nodes.motion.data());
+                      fastest_point = move(piece.points, first + lane, m, walls, dt, fastest_point, speeds.stopped);
+                    }
+                  });
       },
       law);
   speeds.wave = std::sqrt(fastest_wave), speeds.point = std::sqrt(fastest_point);
@@ -182,7 +212,7 @@ void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfe
   std::visit(
       [&](const auto& any) {
         const auto& concrete = law_of_step(any, dt);
-        for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+        for_piece(piece, lattice, settings, {velocity_of(piece)}, [&](int first, int count, const auto& stencil) {
           const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
           fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
         });
@@ -199,12 +229,13 @@ void update_stress_and_force(Piece<Dim>& piece, const Lattice<Dim>& lattice, con
   std::visit(
       [&](const auto& any) {
         const auto& concrete = law_of_step(any, dt);
-        for_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-          const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
-          fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
-          const PointForce<Dim> force(piece.points, first, density, settings.gravity);
-          for (int lane = 0; lane < count; ++lane) force.scatter(stencil, lane, piece.nodes.force.data());
-        });
+        for_piece(piece, lattice, settings, {velocity_of(piece), to_force_of(piece)},
+                  [&](int first, int count, const auto& stencil) {
+                    const auto A = gather_strain(stencil, count, piece.nodes.velocity.data(), dt);
+                    fastest = apply_law(piece.points, first, count, concrete, A, 1.0 / density, fastest);
+                    const PointForce<Dim> force(piece.points, first, density, settings.gravity);
+                    for (int lane = 0; lane < count; ++lane) force.scatter(stencil, lane, piece.nodes.force.data());
+                  });
       },
       law);
   speeds.wave = std::sqrt(fastest);
@@ -214,7 +245,7 @@ template <int Dim>
 double accelerate(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density,
                   double dt) {
   double energy = 0;
-  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+  for_moving_piece(piece, lattice, settings, {motion_of(piece)}, [&](int first, int count, const auto& stencil) {
     energy +=
         accelerate_points(piece, first, count, stencil, density, dt, settings, [](int, const PointMotion<Dim>&) {});
   });
@@ -226,7 +257,7 @@ double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const
                            double density, double dt, SpeedLimits& speeds) {
   double energy = 0, fastest = speeds.point * speeds.point;
   const Walls<Dim> walls(lattice, settings);
-  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+  for_moving_piece(piece, lattice, settings, {motion_of(piece)}, [&](int first, int count, const auto& stencil) {
     energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto& m) {
       fastest = move(piece.points, first + lane, m, walls, dt, fastest, speeds.stopped);
     });
@@ -238,8 +269,8 @@ double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const
 template <int Dim>
 void project_momentum(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                       double density) {
-  piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
-  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
+  piece.nodes.velocity.assign(piece.nodes.storage() * vector_width, 0.0);
+  for_moving_piece(piece, lattice, settings, {to_momentum_of(piece)}, [&](int first, int count, const auto& stencil) {
     for (int lane = 0; lane < count; ++lane)
       scatter_momentum(piece.points, first + lane, stencil, lane, density, piece.nodes.velocity.data());
   });
@@ -249,12 +280,14 @@ template <int Dim>
 double accelerate_and_project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                               double density, double dt) {
   double energy = 0;
-  piece.nodes.velocity.assign(piece.nodes.box.size() * vector_width, 0.0);
-  for_moving_piece(piece, lattice, settings, [&](int first, int count, const auto& stencil) {
-    energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto&) {
-      scatter_momentum(piece.points, first + lane, stencil, lane, density, piece.nodes.velocity.data());
-    });
-  });
+  piece.nodes.velocity.assign(piece.nodes.storage() * vector_width, 0.0);
+  for_moving_piece(
+      piece, lattice, settings, {motion_of(piece), to_momentum_of(piece)},
+      [&](int first, int count, const auto& stencil) {
+        energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto&) {
+          scatter_momentum(piece.points, first + lane, stencil, lane, density, piece.nodes.velocity.data());
+        });
+      });
   return energy;
 }
 
@@ -263,10 +296,10 @@ void subtract_seen(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfe
   using C = PointColumns<Dim>;
   using M = NodeMotion<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  nodes.motion.assign(nodes.box.size() * M::width, 0.0);
-  for (std::size_t node = 0; node < nodes.box.size(); ++node)
+  nodes.motion.assign(nodes.storage() * M::width, 0.0);
+  for (std::size_t node = 0; node < nodes.rows(); ++node)
     std::copy_n(nodes.velocity.data() + node * vector_width, Dim, nodes.motion.data() + node * M::width + M::velocity);
-  for_moving_piece(piece, lattice, settings,
+  for_moving_piece(piece, lattice, settings, {motion_of(piece)},
                    [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
                      for (int lane = 0; lane < count; ++lane) {
                        const PointMotion<Dim> m = gather_motion(stencil, lane, nodes.motion.data());
@@ -288,8 +321,8 @@ void integrate(Piece<Dim>& piece, double dt) {
   using N = NodeSums<Dim>;
   using M = NodeMotion<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  resize_exactly(nodes.motion, nodes.box.size() * M::width);
-  for (std::size_t node = 0; node < nodes.box.size(); ++node) {
+  resize_exactly(nodes.motion, nodes.storage() * M::width);
+  for (std::size_t node = 0; node < nodes.rows(); ++node) {
     const double* sums = nodes.sums.data() + node * N::width;
     const double* f = nodes.force.data() + node * vector_width;
     const double* p = sums + N::momentum;
@@ -306,8 +339,8 @@ template <int Dim>
 void velocity_from_sums(Piece<Dim>& piece) {
   using N = NodeSums<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  resize_exactly(nodes.velocity, nodes.box.size() * vector_width);
-  for (std::size_t node = 0; node < nodes.box.size(); ++node) {
+  resize_exactly(nodes.velocity, nodes.storage() * vector_width);
+  for (std::size_t node = 0; node < nodes.rows(); ++node) {
     const double* sums = nodes.sums.data() + node * N::width;
     const double* p = sums + N::momentum;
     const double inverse = sums[N::mass] > 0 ? 1.0 / sums[N::mass] : 0.0;
@@ -319,7 +352,7 @@ template <int Dim>
 void velocity_from_momentum(Piece<Dim>& piece) {
   using N = NodeSums<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  for (std::size_t node = 0; node < nodes.box.size(); ++node) {
+  for (std::size_t node = 0; node < nodes.rows(); ++node) {
     const double mass = nodes.sums[node * N::width + N::mass];
     const double inverse = mass > 0 ? 1.0 / mass : 0.0;
     for (int d = 0; d < Dim; ++d) nodes.velocity[node * vector_width + d] *= inverse;
@@ -330,7 +363,7 @@ template <int Dim>
 void centre_motion(Piece<Dim>& piece) {
   using M = NodeMotion<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  for (std::size_t node = 0; node < nodes.box.size(); ++node)
+  for (std::size_t node = 0; node < nodes.rows(); ++node)
     for (int d = 0; d < Dim; ++d) {
       double& v = nodes.motion[node * M::width + M::velocity + d];
       v = 0.5 * (v + nodes.velocity[node * vector_width + d]);
@@ -360,8 +393,8 @@ template <int Dim>
 void velocity_from_motion(Piece<Dim>& piece) {
   using M = NodeMotion<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
-  nodes.velocity.assign(nodes.box.size() * vector_width, 0.0);
-  for (std::size_t node = 0; node < nodes.box.size(); ++node)
+  nodes.velocity.assign(nodes.storage() * vector_width, 0.0);
+  for (std::size_t node = 0; node < nodes.rows(); ++node)
     std::copy_n(nodes.motion.data() + node * M::width + M::velocity, Dim, nodes.velocity.data() + node * vector_width);
 }
 

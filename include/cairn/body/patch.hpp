@@ -71,6 +71,8 @@ struct Patch {
   double seconds = 0;  // processor time spent on it since the last balance; steers nothing but balance
   std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
   std::map<int, ToolSum> tools;                             // by their number; likewise
+  // Points of cracks: its own, and copies of those of neighbours within reach; ascending in (crack, index).
+  std::vector<CrackPoint<Dim>> cracks;
 
   Patch(PatchId id_, const Lattice<Dim>& lattice)
       : id(id_), cells(lattice.patch_cells(id_)), nodes(lattice.patch_nodes(id_)) {
@@ -82,7 +84,7 @@ struct Patch {
   }
 
   /// Whether nothing has to be remembered of it: sums over all patches may leave it out.
-  bool blank() const { return point_count() == 0 && contacts.empty() && tools.empty() && ledger == PatchLedger{}; }
+  bool blank() const { return point_count() == 0 && contacts.empty() && tools.empty() && cracks.empty() && ledger == PatchLedger{}; }
 
   std::int64_t point_count() const {
     std::int64_t n = 0;

@@ -1,6 +1,7 @@
 #pragma once
 /// Piece: the part of one body that lies in one patch. It owns its points and a small dense box of nodes.
 
+#include "cairn/body/further_rows.hpp"
 #include "cairn/body/points.hpp"
 #include "cairn/grid/box.hpp"
 
@@ -46,7 +47,8 @@ struct NodeMotion {
 };
 inline constexpr int vector_width = 4;  // a vector at a node, padded
 
-/// Nodal quantities of one velocity field over a box of nodes.
+/// Nodal quantities of a body: of its velocity field over a box of nodes, and of what further fields it has where
+/// cracks cut it. Arrays hold `storage` rows: the box, the further rows, and a scratch copy of some.
 template <int Dim>
 struct NodeBox {
   Box<Dim> box;             // all nodes with data: own and received
@@ -56,10 +58,18 @@ struct NodeBox {
   AlignedDoubles velocity;  // velocity for strains [m/s] (or momentum, while it is projected again), vector_width
   AlignedDoubles motion;    // NodeMotion
   AlignedDoubles extras;    // NodeExtras, empty where not needed
+  FurtherRows<Dim> further;
+
+  /// Rows that hold something.
+  std::size_t rows() const { return box.size() + further.rows.size(); }
+  std::size_t storage() const { return rows() + further.scratch; }
+  /// The row of a further one, by its position.
+  int row_of(int further_row) const { return static_cast<int>(box.size()) + further_row; }
 
   std::size_t memory() const {
-    return (sums.capacity() + force.capacity() + velocity.capacity() + motion.capacity() + extras.capacity()) *
-           sizeof(double);
+    return further.memory() +
+           (sums.capacity() + force.capacity() + velocity.capacity() + motion.capacity() + extras.capacity()) *
+               sizeof(double);
   }
 };
 

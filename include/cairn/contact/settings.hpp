@@ -20,6 +20,15 @@ struct PairLaw {
   bool binds() const { return law == ContactLaw::none || law == ContactLaw::stick; }
 };
 
+/// What contact needs to know of a crack.
+struct CrackContact {
+  bool meets = true;        // its faces keep each other out, or stick
+  PairLaw law;              // between the faces
+  bool all_bodies = true;   // cuts every body that is not rigid
+  std::vector<int> bodies;  // else those that it cuts, ascending
+  bool cuts_body(int body) const { return all_bodies || std::binary_search(bodies.begin(), bodies.end(), body); }
+};
+
 template <int Dim>
 struct FaceCondition {
   FaceType type = FaceType::free;
@@ -57,6 +66,7 @@ struct ContactSettings {
   std::vector<ContactMaterial> materials;
   std::vector<PairLaw> pairs;  // materials x materials
   FaceConditions<Dim> faces{};
+  std::vector<CrackContact> cracks;
   contact::TouchingGap gap, gap_at_wall;
   bool keep_contacts = false;  // sum what passes between pairs, for output
   bool keep_tools = false;     // sum what bodies do to tools

@@ -6,7 +6,8 @@
 /// A node holds pairs. Every body at it forms one with the partner (the rigid body there, or else the heaviest), and
 /// one with each wall on which or beyond which the node lies: a rigid partner with a known normal. What holds is
 /// brought to rest with the least change of kinetic energy, all pairs at once; impulses of a pair are equal and
-/// opposite.
+/// opposite. Where cracks cut bodies, a node's entries are their velocity fields: bodies meet in fields on the same
+/// side of the cracks, and fields of one body meet across a crack (src/contact/sided_nodes.cpp).
 
 #include "cairn/contact/course.hpp"
 #include "cairn/contact/laws.hpp"
@@ -15,10 +16,12 @@
 
 namespace cairn {
 
-/// One body at a node of contact.
+/// One body at a node of contact, or one of its velocity fields there.
 template <int Dim>
 struct ContactEntry {
-  int piece = 0, node = 0;  // position in the patch's pieces, offset in the piece's box
+  int piece = 0, node = 0;  // position in the patch's pieces, row among the piece's nodes
+  SideSet sides;
+  int whole = -1;  // of a field among several: sums of its whole body, in ContactSweep::wholes_
   int material = 0;
   double mass = 0;
   bool rigid = false;
@@ -33,10 +36,11 @@ struct NodePair {
   static constexpr int none = -1;
   int a = 0, b = none;  // entries, counted from the node's first; b is none for walls (and for all with own normals)
   int face = none;      // of a wall
+  int crack = none;     // across a crack, from below to above
   PairLaw law;
   Vec<Dim> normal = Vec<Dim>::Zero();  // out of a
   bool open = false;                   // contact is possible (not: too little mass there, no normal, a fixed face)
-  double gap = 0;                      // [cells]
+  double gap = 0;                      // [cells]; across a crack [m]
   double yield = 0;                    // what a unit of force adds to the gap that counts as touching [cells/N]
   int gap_node = 0;                    // at a wall: offset of the node on it, which answers for those beyond
   bool compressive = false, stress_free = false;
@@ -89,11 +93,29 @@ class ContactSweep {
   void set_gates(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                  const ContactSettings<Dim>& settings);
 
+  const double* sums_of(const ContactEntry<Dim>& entry, const Patch<Dim>& patch) const;
+
+  // sided_nodes.cpp
+  bool has_sides(const Node& node) const;
+  bool crosses_cracks(const Node& node) const;
+  void solve_for_least();
+  void sum_wholes(const Node& node, const Patch<Dim>& patch);
+  void list_sided_pairs(Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                        const ContactSettings<Dim>& settings, bool fixed);
+  bool on_one_side(const ContactEntry<Dim>& a, const ContactEntry<Dim>& b, const Patch<Dim>& patch,
+                   const ContactSettings<Dim>& settings) const;
+  void add_crack_pairs(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                       const ContactSettings<Dim>& settings);
+  const double* crossing(const ContactEntry<Dim>& entry, int crack, const Patch<Dim>& patch) const;
+  Vec<Dim> crack_normal(const Node& node, int crack, const Patch<Dim>& patch) const;
+
   // solve_node.cpp: the impulses of all pairs of a node, from momenta_ and forces_; their sums on the bodies in
   // impulses_
   void solve(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
              const ContactSettings<Dim>& settings, double dt, Pass pass);
   void decide(const Node& node, const Patch<Dim>& patch, const ContactSettings<Dim>& settings, double dt);
+  contact::Decision decide_across(const NodePair<Dim>& pair, const Vec<Dim>& P, const Vec<Dim>& F, double mass,
+                                  double dt) const;
   void solve_pair(const Node& node, NodePair<Dim>& pair, Pass pass);
   void solve_together(const Node& node, Pass pass);
   void bring_to_rest(const Node& node);
@@ -120,6 +142,7 @@ class ContactSweep {
   std::vector<Node> nodes_;
   std::vector<ContactEntry<Dim>> entries_;
   std::vector<NodePair<Dim>> pairs_;
+  std::vector<std::array<double, NodeSums<Dim>::width>> wholes_;
   std::vector<Body> turning_;  // the rigid bodies among them that turn or gather speed
   std::array<Vec<Dim>, 2 * Dim> wall_velocities_;
   // Of the node in hand:

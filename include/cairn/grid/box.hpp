@@ -34,6 +34,12 @@ struct Box {
     for (int d = Dim - 1; d >= 0; --d) o = o * extent(d) + (i[d] - lower[d]);
     return o;
   }
+  /// The position with an offset.
+  Index<Dim> place(int offset) const {
+    Index<Dim> i;
+    for (int d = 0; d < Dim; offset /= extent(d), ++d) i[d] = lower[d] + offset % extent(d);
+    return i;
+  }
   bool contains(const Index<Dim>& i) const {
     for (int d = 0; d < Dim; ++d)
       if (i[d] < lower[d] || i[d] >= upper[d]) return false;

@@ -13,6 +13,7 @@
 #include "cairn/body/shape.hpp"
 #include "cairn/body/tool.hpp"
 #include "cairn/core/options.hpp"
+#include "cairn/crack/options.hpp"
 
 namespace cairn {
 
@@ -105,6 +106,8 @@ struct Case {
   std::vector<Material> materials;
   std::vector<BodySpec> bodies;  // [[bodies]] in order, then the rows of every [[grains]] in order
   std::vector<Drive> drives;
+  std::vector<CrackSpec> cracks;
+  CrackOptions crack;
   std::array<Face, 6> faces;
   Output output;
   ParallelOptions parallel;

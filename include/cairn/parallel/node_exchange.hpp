@@ -4,8 +4,9 @@
 /// Each patch sends, for every neighbouring patch and every piece that touches nodes both share, the box of shared
 /// nodes and the piece's own contributions there; it receives the like. A body that only the neighbour knows arrives as
 /// a ghost piece. Contributions are added in ascending order of (patch, the contributor's own node position), the
-/// patch's own included, so that every patch finds the same bits, wherever patches live. All messages between two ranks
-/// travel as one. Afterwards a patch holds complete sums on all nodes that its points touch.
+/// patch's own included, so that every patch finds the same bits, wherever patches live. Further rows of the shared
+/// nodes (cracks) travel and are summed alike, and come as ghosts do. All messages between two ranks travel as one.
+/// Afterwards a patch holds complete sums on all nodes that its points touch.
 
 #include <span>
 
@@ -55,7 +56,9 @@ class NodeExchange {
     int link, body;
     Box<Dim> box;  // in the receiver's frame
     int rank;
-    std::size_t at, nodes_before;  // first number in the message of the sums; nodes before it in the message
+    std::size_t at, nodes_before;  // first number in the message of the sums; rows before it in the message
+    std::size_t rows_at = 0;       // first number of its further rows in the message of the sums
+    std::vector<int> further;      // where these are in the piece, once it has been added to
   };
   struct Sent {
     int body;
@@ -71,8 +74,10 @@ class NodeExchange {
   void parse(int rank);
   std::vector<Part>& parts_of(PatchId patch);
   void renew_ghosts(Patch<Dim>& patch, std::vector<Part>& parts) const;
-  void add_to_piece(Piece<Dim>& piece, int links_before, std::span<const Part> parts) const;
+  void add_to_piece(Piece<Dim>& piece, int links_before, std::span<Part> parts) const;
   void add_part(NodeBox<Dim>& nodes, const Part& part) const;
+  void receive_rows(NodeBox<Dim>& nodes, const Box<Dim>& box, std::span<Part> parts) const;
+  void add_rows(NodeBox<Dim>& nodes, std::span<const Part> parts, std::size_t parts_before) const;
 
   NeighbourExchange& messages_;
   Content out_, in_;                      // of what is put, and of what is added

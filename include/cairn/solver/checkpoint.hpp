@@ -37,12 +37,12 @@ class Checkpoint {
   /// \throws InputError if the file is of another dimension or another division into patches
   template <int Dim>
   void check_layout(const Lattice<Dim>& lattice) const;
-  /// Gives this rank's patches (ascending, empty) their points, ledgers and contacts.
+  /// Gives this rank's patches (ascending, empty) their points, ledgers, contacts and crack points.
   /// \throws InputError if the content does not match its checksums or the case's bodies and materials, or is no state
   /// of a run: counts, order, points that are not finite, inverted, there twice or not in their patch
   template <int Dim>
   void fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice, const std::vector<Body>& bodies,
-            const std::vector<SolverMaterial>& materials) const;
+            const std::vector<SolverMaterial>& materials, const std::vector<Crack>& cracks) const;
 
  private:
   CheckpointReader reader_;
@@ -51,6 +51,7 @@ class Checkpoint {
   std::string case_text_;
   std::vector<PatchId> patches_;
   std::vector<std::int64_t> points_, pieces_, contacts_, tools_;  // of each
+  std::vector<std::int64_t> cracks_;  // crack points; empty where the case has no cracks
 };
 
 }  // namespace cairn

@@ -13,6 +13,14 @@ template <int Dim>
 void write_particles(Simulation<Dim>& simulation, const std::filesystem::path& file,
                      const std::vector<std::string>& fields);
 
+/// Writes one row for each crack point: plane, faces, opening. Collective.
+template <int Dim>
+void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path& file);
+
+/// Writes one row for each tip of a crack: where it is, J and stress intensities. Collective.
+template <int Dim>
+void write_tips(Simulation<Dim>& simulation, const std::filesystem::path& file);
+
 /// Writes one row for each body. Collective.
 template <int Dim>
 void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path& file);

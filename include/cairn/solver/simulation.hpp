@@ -7,6 +7,8 @@
 
 #include "cairn/boundary/faces.hpp"
 #include "cairn/contact/sweep.hpp"
+#include "cairn/crack/faces.hpp"
+#include "cairn/crack/j_integral.hpp"
 #include "cairn/io/case.hpp"
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/parallel/migration.hpp"
@@ -51,6 +53,13 @@ struct StepState {
 struct Notice {
   double stop = 0;  // a reason to stop, above 0
   double wall = 0;  // a wall time [s]
+};
+
+/// A crack's tip and what drives it.
+struct TipState {
+  CrackTip tip;
+  double J = 0, J_static = 0;           // with the terms of motion, and without [J/m2]
+  double K_opening = 0, K_sliding = 0;  // [Pa m^1/2]; NaN where the law is not linear
 };
 
 class Checkpoint;
@@ -98,6 +107,7 @@ class Simulation {
       for (auto& piece : patch.pieces) piece.projected = false;
     return patches_;
   }
+  const std::vector<Crack>& cracks() const { return cracks_; }
   const std::vector<Tool>& tools() const { return tools_; }
   /// Of faces those that hold something are tools.
   bool has_tool(int tool) const {
@@ -131,6 +141,10 @@ class Simulation {
   /// after a step that failed.
   void project_stress();
 
+  /// The tips of cracks, ascending in (crack, end), the same on every rank. The nodes are projected anew. Collective;
+  /// not after a step that failed.
+  std::vector<TipState> tip_states();
+
   /// Energies, momentum and ledger. Collective; the result is valid on rank 0.
   Totals totals() const;
 
@@ -151,6 +165,8 @@ class Simulation {
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
   void finish_points(Patch<Dim>& patch, double share);
   void receive_points();  // communicates
+  void move_cracks();     // communicates, where there are any
+  void receive_cracks();  // likewise
 
   // Between the stages: how tools move in the step (tools.cpp).
   void begin_tools();
@@ -219,8 +235,25 @@ class Simulation {
   bool projects_again() const {
     return solver_.stress_update == StressUpdate::both || solver_.stress_update == StressUpdate::modified_last;
   }
-  void project_piece(Piece<Dim>& piece);
-  void project_ahead(Piece<Dim>& piece);
+  void lay_out(Patch<Dim>& patch, Piece<Dim>& piece);
+  void project_piece(Patch<Dim>& patch, Piece<Dim>& piece);
+  void project_ahead(Patch<Dim>& patch, Piece<Dim>& piece);
+  // solver/cracks.cpp
+  void define_cracks(const Case& c);
+  template <class F>
+  void for_crack_points(const Case& c, F&& f) const;
+  std::vector<PatchId> patches_of_cracks(const Case& c) const;  // that hold a point of a crack
+  void place_cracks(const Case& c);
+  void find_cracks(Patch<Dim>& patch);  // their segments, where they are now
+  void check_points_on_cracks(const Case& c);
+  // solver/tips.cpp
+  std::vector<CrackTip> find_tips() const;
+  void find_motion();
+  void add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip>& tips, std::vector<TipSums>& sums) const;
+  CrackSegments<Dim>& segments_of(const Patch<Dim>& patch) { return segments_[&patch - patches_.data()]; }
+  CrackSurroundings<Dim> surroundings_of(const Patch<Dim>& patch) {
+    return {patch, lattice_, segments_of(patch), cracks_, crack_densities_};
+  }
   void finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share);
   void turn_stress(Piece<Dim>& piece);
   void move_rigid(Piece<Dim>& piece);
@@ -265,6 +298,12 @@ class Simulation {
   PatchTable<Dim> table_;
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
   std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
+  std::vector<Crack> cracks_;
+  std::vector<CrackSegments<Dim>> segments_;                // for each patch
+  std::vector<std::vector<FaceMotion<Dim>>> face_motions_;  // for each patch: of its neighbours' crack points
+  std::vector<Material> specs_;                             // of materials, where there are cracks
+  std::array<double, 2> j_radius_{};                        // [cells]
+  std::vector<double> crack_densities_;                     // of bodies; 0 for rigid ones [kg/m3]
   std::unique_ptr<NeighbourExchange> messages_;
   std::unique_ptr<NodeExchange<Dim>> exchange_;
   std::unique_ptr<Migration<Dim>> migration_;

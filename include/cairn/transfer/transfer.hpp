@@ -124,6 +124,12 @@ void centre_motion(Piece<Dim>& piece);
 template <int Dim>
 void subtract_seen(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings);
 
+/// nodes -> points: acceleration sum N a, velocity gradient sum v (x) grad N (row by row), of NodeMotion, for each
+/// point.
+template <int Dim>
+std::vector<std::array<double, Dim + Dim * Dim>> point_kinematics(const Piece<Dim>& piece, const Lattice<Dim>& lattice,
+                                                                  const TransferSettings<Dim>& settings);
+
 /// nodes: velocity = that of the motion, after the momentum update.
 template <int Dim>
 void velocity_from_motion(Piece<Dim>& piece);

@@ -1,0 +1,85 @@
+#pragma once
+/// Explicit cracks as patches hold them: a polyline of crack points (Nairn 2013; docs/cracks.md). 2D.
+
+#include <cstdint>
+#include <tuple>
+
+#include "cairn/body/points.hpp"
+
+namespace cairn {
+
+/// A point of a crack. The plane lies between the two faces, which begin in one place and move with the material on
+/// their sides. Upper is left of the crack's direction, that of ascending index.
+template <int Dim>
+struct CrackPoint {
+  std::int32_t crack = 0, index = 0;  // index along the crack, kept for life
+  bool own = true;                    // of the patch that holds it; else a copy of a neighbour's
+  bool filled = true;                 // material lay beside it in the last step
+  Image image{};                      // crossings of periodic boundaries since the start
+  Vec<Dim> plane = Vec<Dim>::Zero();  // [m]
+  Vec<Dim> lower = Vec<Dim>::Zero();  // face below [m]
+  Vec<Dim> upper = Vec<Dim>::Zero();  // face above [m]
+  Vec<Dim> lower_velocity = Vec<Dim>::Zero(), upper_velocity = Vec<Dim>::Zero();  // in the last step [m/s]
+
+  Vec<Dim> opening() const { return upper - lower; }                         // [m]
+  const Vec<Dim>& face(int side) const { return side > 0 ? upper : lower; }  // 1 above, -1 below
+  Vec<Dim>& velocity(int side) { return side > 0 ? upper_velocity : lower_velocity; }
+  /// Goes with the faces' velocities.
+  void move(double dt) {
+    lower += dt * lower_velocity, upper += dt * upper_velocity;
+    plane = 0.5 * (lower + upper);
+  }
+  void shift(const Vec<Dim>& by) { plane += by, lower += by, upper += by; }
+  /// The order in patches: images of one crack across periodic boundaries are lines of their own.
+  friend bool operator<(const CrackPoint& a, const CrackPoint& b) {
+    return std::tie(a.crack, a.image, a.index) < std::tie(b.crack, b.image, b.index);
+  }
+  /// Whether b comes next on the same line.
+  bool precedes(const CrackPoint& b) const { return crack == b.crack && image == b.image && index + 1 == b.index; }
+};
+
+/// The cracks that the straight line from a point to a node crosses, at most three, as one number that orders them.
+/// With a body it names a velocity field; empty, that of the points on the node's own side of all cracks.
+class SideSet {
+ public:
+  static constexpr int most = 3;
+
+  SideSet() = default;
+  explicit SideSet(std::int64_t key) : key_(key) {}
+  /// The set with one more crack, larger than those in it. Not for more than `most`.
+  SideSet with(int crack) const {
+    return SideSet(key_ | static_cast<std::int64_t>(crack + 1) << bits * (most - 1 - size()));
+  }
+  std::int64_t key() const { return key_; }
+  bool empty() const { return key_ == 0; }
+  int size() const {
+    int n = 0;
+    while (n < most && crack(n) >= 0) ++n;
+    return n;
+  }
+  /// The n-th crack of the set, ascending; -1 where there is none.
+  int crack(int n) const { return static_cast<int>(key_ >> bits * (most - 1 - n) & mask) - 1; }
+  bool contains(int c) const { return crack(0) == c || crack(1) == c || crack(2) == c; }
+  /// The set of those cracks for which keep(crack).
+  template <class F>
+  SideSet only(F&& keep) const {
+    SideSet s;
+    for (int n = 0; n < most; ++n)
+      if (crack(n) >= 0 && keep(crack(n))) s = s.with(crack(n));
+    return s;
+  }
+  SideSet without(int c) const {
+    return only([&](int other) { return other != c; });
+  }
+  friend bool operator==(const SideSet&, const SideSet&) = default;
+  friend auto operator<=>(const SideSet&, const SideSet&) = default;
+
+  static constexpr int bits = 21;
+  static constexpr std::int64_t mask = (std::int64_t{1} << bits) - 1;
+  static constexpr int most_cracks = static_cast<int>(mask) - 1;
+
+ private:
+  std::int64_t key_ = 0;
+};
+
+}  // namespace cairn

@@ -1,0 +1,23 @@
+#pragma once
+/// Whether a straight line from a material point to a node crosses a segment of a crack, without rounding errors and
+/// with one rule for ties: the node is thought moved by (e, e^2), e -> 0+, then the point by smaller powers of e. So no
+/// node lies on a crack, no crack point on a line, and a line through a crack point crosses exactly one of its two
+/// segments.
+
+#include "cairn/core/types.hpp"
+
+namespace cairn::crack {
+
+/// The sign of (b - a) x (c - a), exact: 1 where c lies left of the line from a to b, 0 on it.
+int orientation(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c);
+
+/// The side of the line from the point p to the node i on which the crack point c lies: 1 left, -1 right.
+int side_of_line(const Vec<2>& p, const Vec<2>& i, const Vec<2>& c);
+
+/// The side of the segment from a to b on which a node or point q lies: 1 left (above), -1 right (below).
+int side_of_segment(const Vec<2>& a, const Vec<2>& b, const Vec<2>& q);
+
+/// Whether the line from p to i crosses the segment from a to b: 1 from above to below, -1 from below to above, 0 not.
+int crossing(const Vec<2>& p, const Vec<2>& i, const Vec<2>& a, const Vec<2>& b);
+
+}  // namespace cairn::crack

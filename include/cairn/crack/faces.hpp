@@ -1,0 +1,56 @@
+#pragma once
+/// How cracks move with the material: their faces see the rows on their side.
+
+#include "cairn/crack/sides.hpp"
+
+namespace cairn {
+
+/// The rows that a face of a crack sees, with weights that sum to 1 (moving least squares): they reproduce linear
+/// fields and leave out light nodes smoothly. The same weights give the face its velocity and the rows its force, so
+/// that momentum, angular momentum and power balance.
+template <int Dim>
+struct FaceRows {
+  struct At {
+    Index<Dim> place;
+    SideSet sides;
+    double weight;
+  };
+  std::vector<At> rows;
+  double filled = 0;  // share of the nodes' weights that lies on nodes with material
+  bool is_filled() const { return filled >= 0.5; }
+};
+
+/// A body's material at nodes, as its faces need it.
+template <int Dim>
+struct CrackSurroundings {
+  const Patch<Dim>& patch;
+  const Lattice<Dim>& lattice;
+  const CrackSegments<Dim>& segments;
+  const std::vector<Crack>& cracks;
+  const std::vector<double>& densities;  // of bodies; 0 for rigid ones, which no crack cuts [kg/m3]
+};
+
+/// \param side  1 above, -1 below
+template <int Dim>
+FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, int side);
+
+/// Velocity of a face that lies among a patch's nodes while its crack point is a neighbour's.
+template <int Dim>
+struct FaceMotion {
+  std::int32_t point;  // position in the patch's list
+  int side;            // 1 above, -1 below
+  Vec<Dim> velocity;   // [m/s]
+};
+
+/// Gives the patch's own crack points the velocities of their faces, from NodeMotion's velocity, which moves the
+/// material as well. Of wide cracks a face may lie with a neighbour: returns what this patch knows of faces of others'
+/// points.
+template <int Dim>
+std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,
+                                                  const CrackSurroundings<Dim>& around);
+
+/// Own crack points that no material lies beside go with the nearest along the crack that it does.
+template <int Dim>
+void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points);
+
+}  // namespace cairn

@@ -1,0 +1,282 @@
+#include "cairn/crack/faces.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <optional>
+
+namespace cairn {
+namespace {
+
+constexpr double light = 0.1;   // nodes filled by less than this share count the less
+constexpr double aside = 1e-3;  // cells from the plane at which a face begins
+constexpr double stiff = 1e-3;  // of the linear part of the weights' matrix, where rows lie on a line
+
+double spline(double u) {
+  u = std::abs(u);
+  if (u < 0.5) return 0.75 - u * u;
+  return u < 1.5 ? 0.5 * (1.5 - u) * (1.5 - u) : 0.0;
+}
+
+/// Mass, momentum and share of a full node of all cut bodies in one row.
+template <int Dim>
+struct RowState {
+  double mass = 0, fill = 0;
+  Vec<Dim> momentum = Vec<Dim>::Zero();
+};
+
+template <int Dim>
+RowState<Dim> state_of(const CrackSurroundings<Dim>& around, int crack, const Index<Dim>& place, SideSet sides) {
+  RowState<Dim> state;
+  for (const auto& piece : around.patch.pieces) {
+    const NodeBox<Dim>& nodes = piece.nodes;
+    const double density = around.densities[piece.body];
+    if (!(density > 0) || !around.cracks[crack].cuts(piece.body) || !nodes.box.contains(place)) continue;
+    const int further = sides.empty() ? -1 : nodes.further.find(place, sides);
+    if (!sides.empty() && further < 0) continue;
+    const int row = sides.empty() ? nodes.box.offset(place) : nodes.row_of(further);
+    const double mass = nodes.sums[static_cast<std::size_t>(row) * NodeSums<Dim>::width];
+    state.mass += mass, state.fill += mass / (density * around.lattice.cell_volume());
+    if (nodes.motion.empty()) continue;
+    using M = NodeMotion<Dim>;
+    state.momentum +=
+        mass * Eigen::Map<const Vec<Dim>>(nodes.motion.data() + static_cast<std::size_t>(row) * M::width + M::velocity);
+  }
+  return state;
+}
+
+/// The cracks that the line from a face to a node crosses: the own one is left on the side's side.
+template <int Dim>
+SideSet sides_seen(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, const Vec<Dim>& face,
+                   const Vec<Dim>& start, const Vec<Dim>& node, int body) {
+  const auto near_start = around.segments.near(start, around.lattice),
+             near = around.segments.near(face, around.lattice);
+  const SideSet own = around.segments.crossed(near_start, start, node, body, around.cracks).sides;
+  const SideSet others = around.segments.crossed(near, face, node, body, around.cracks).sides;
+  std::array<int, 2 * SideSet::most> list;
+  int n = 0;
+  for (int k = 0; k < others.size(); ++k)
+    if (others.crack(k) != point.crack) list[n++] = others.crack(k);
+  if (own.contains(point.crack)) list[n++] = point.crack;
+  std::sort(list.begin(), list.begin() + n);
+  SideSet sides;
+  for (int k = 0; k < std::min(n, SideSet::most); ++k) sides = sides.with(list[k]);
+  return sides;
+}
+
+/// A body that the crack cuts, of those in the patch; -1: none.
+template <int Dim>
+int cut_body(const CrackSurroundings<Dim>& around, int crack) {
+  for (const auto& piece : around.patch.pieces)
+    if (around.densities[piece.body] > 0 && around.cracks[crack].cuts(piece.body)) return piece.body;
+  return -1;
+}
+
+/// Calls f(place, node, weight) for the nodes nearest to x.
+template <int Dim, class F>
+void for_nearest(const Lattice<Dim>& lattice, const Vec<Dim>& x, F&& f) {
+  Box<Dim> around;
+  for (int d = 0; d < Dim; ++d) {
+    const int middle = static_cast<int>(std::floor(lattice.scaled(d, x[d]) + 0.5));
+    around.lower[d] = middle - 1, around.upper[d] = middle + 2;
+  }
+  for_each(around, [&](const Index<Dim>& place) {
+    Vec<Dim> node;
+    double weight = 1;
+    for (int d = 0; d < Dim; ++d) {
+      node[d] = lattice.node_position(d, place[d]);
+      weight *= spline(lattice.scaled(d, x[d]) - place[d]);
+    }
+    f(place, node, weight);
+  });
+}
+
+/// Velocity of the material that a face sees.
+template <int Dim>
+Vec<Dim> velocity_of(const CrackSurroundings<Dim>& around, int crack, const FaceRows<Dim>& face) {
+  Vec<Dim> v = Vec<Dim>::Zero();
+  for (const auto& at : face.rows) {
+    const auto state = state_of<Dim>(around, crack, at.place, at.sides);
+    v += at.weight / state.mass * state.momentum;
+  }
+  return v;
+}
+
+/// The common velocity of all that moves around x; nothing where nothing does.
+template <int Dim>
+std::optional<Vec<Dim>> common_velocity(const CrackSurroundings<Dim>& around, int crack, const Vec<Dim>& x) {
+  double mass = 0;
+  Vec<Dim> momentum = Vec<Dim>::Zero();
+  for_nearest(around.lattice, x, [&](const Index<Dim>& place, const Vec<Dim>&, double weight) {
+    const auto add = [&](SideSet sides) {
+      const auto state = state_of<Dim>(around, crack, place, sides);
+      mass += weight * state.mass, momentum += weight * state.momentum;
+    };
+    add({});
+    std::vector<SideSet> seen;
+    for (const auto& piece : around.patch.pieces) {
+      const auto [first, last] = piece.nodes.further.at(place);
+      for (int k = first; k < last; ++k) seen.push_back(piece.nodes.further.rows[k].sides);
+    }
+    std::sort(seen.begin(), seen.end());
+    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+    for (const SideSet sides : seen) add(sides);
+  });
+  if (!(mass > 0)) return {};
+  return Vec<Dim>(momentum / mass);
+}
+
+}  // namespace
+
+template <int Dim>
+FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, int side) {
+  FaceRows<Dim> face;
+  const int body = cut_body(around, point.crack);
+  const Vec<Dim> normal = around.segments.normal_near(point.crack, point.plane);
+  if (body < 0 || !(normal.squaredNorm() > 0)) return face;
+  const Lattice<Dim>& lattice = around.lattice;
+  const Vec<Dim> x = side > 0 ? point.upper : point.lower;
+  const Vec<Dim> start = point.plane + side * aside * lattice.smallest_spacing() * normal;
+  constexpr int size = 1 + Dim;
+  using Square = Eigen::Matrix<double, size, size>;
+  Square M = Square::Zero();
+  const auto basis = [&](const Index<Dim>& place) {
+    Eigen::Matrix<double, size, 1> b;
+    b[0] = 1;
+    for (int d = 0; d < Dim; ++d) b[1 + d] = place[d] - lattice.scaled(d, x[d]);
+    return b;
+  };
+  for_nearest(lattice, x, [&](const Index<Dim>& place, const Vec<Dim>& node, double weight) {
+    const SideSet sides = sides_seen(around, point, x, start, node, body);
+    const double fill = std::min(1.0, state_of<Dim>(around, point.crack, place, sides).fill / light);
+    if (!(weight * fill > 0)) return;
+    face.filled += weight * fill;
+    face.rows.push_back({place, sides, weight * fill});
+    M += weight * fill * basis(place) * basis(place).transpose();
+  });
+  if (face.rows.empty()) return face;
+  for (int d = 1; d < size; ++d) M(d, d) += stiff * M(0, 0);
+  const Eigen::Matrix<double, size, 1> row = M.ldlt().solve(Eigen::Matrix<double, size, 1>::Unit(0));
+  double sum = 0;
+  for (auto& at : face.rows) at.weight *= row.dot(basis(at.place)), sum += at.weight;
+  for (auto& at : face.rows) at.weight /= sum;
+  return face;
+}
+
+namespace {
+
+/// Whether x lies so near to a patch's cells that it has all nodes around it.
+template <int Dim>
+bool is_among_nodes(const Lattice<Dim>& lattice, const Box<Dim>& cells, const Vec<Dim>& x) {
+  for (int d = 0; d < Dim; ++d) {
+    const double xi = lattice.scaled(d, x[d]);
+    if (!(xi >= cells.lower[d] - 0.49 && xi <= cells.upper[d] + 0.49)) return false;
+  }
+  return true;
+}
+
+/// The cells of the patch to which a crack point belongs, in this patch's frame; empty where none is near.
+template <int Dim>
+Box<Dim> cells_of_owner(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point) {
+  for (const auto& link : around.patch.links) {
+    const Box<Dim> cells = around.lattice.patch_cells(link.patch).shifted(link.shift);
+    Index<Dim> cell;
+    for (int d = 0; d < Dim; ++d) {
+      cell[d] = static_cast<int>(std::floor(around.lattice.scaled(d, point.plane[d])));
+      if (!around.lattice.periodic(d)) cell[d] = std::clamp(cell[d], 0, around.lattice.cells()[d] - 1);
+    }
+    if (cells.contains(cell)) return cells;
+  }
+  return {};
+}
+
+/// Velocities of the two faces, where they are known: {below, above}.
+template <int Dim>
+using Faces = std::array<std::optional<Vec<Dim>>, 2>;
+
+template <int Dim>
+Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point) {
+  const Crack& crack = around.cracks[point.crack];
+  Faces<Dim> faces;
+  if ((point.index == crack.ends[0] && !crack.open[0]) || (point.index == crack.ends[1] && !crack.open[1])) {
+    faces[0] = faces[1] = common_velocity(around, point.crack, point.plane);
+    return faces;
+  }
+  for (const int side : {-1, 1}) {
+    auto& velocity = faces[side > 0];
+    if (!is_among_nodes(around.lattice, around.patch.cells, point.face(side))) {
+      // A neighbour's: what it did last, until it tells.
+      velocity = side > 0 ? point.upper_velocity : point.lower_velocity;
+      continue;
+    }
+    const auto rows = rows_of_face(around, point, side);
+    if (rows.is_filled()) velocity = velocity_of(around, point.crack, rows);
+  }
+  if (!faces[1]) faces[1] = faces[0];
+  if (!faces[0]) faces[0] = faces[1];
+  return faces;
+}
+
+}  // namespace
+
+template <int Dim>
+std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,
+                                                  const CrackSurroundings<Dim>& around) {
+  const Lattice<Dim>& lattice = around.lattice;
+  std::vector<Faces<Dim>> known(points.size());
+  std::vector<FaceMotion<Dim>> told;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const CrackPoint<Dim>& point = points[k];
+    if (point.own) {
+      known[k] = velocities_of_faces(around, point);
+      continue;
+    }
+    for (const int side : {-1, 1}) {
+      const Vec<Dim>& x = point.face(side);
+      if (!is_among_nodes(lattice, around.patch.cells, x)) continue;
+      const Box<Dim> owner = cells_of_owner(around, point);
+      if (owner.empty() || is_among_nodes(lattice, owner, x)) continue;
+      const auto rows = rows_of_face(around, point, side);
+      if (rows.is_filled()) told.push_back({static_cast<int>(k), side, velocity_of(around, point.crack, rows)});
+    }
+  }
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    CrackPoint<Dim>& point = points[k];
+    if (!point.own) continue;
+    point.filled = known[k][0].has_value();
+    Faces<Dim>& faces = known[k];
+    if (!faces[0]) faces[0] = faces[1] = common_velocity(around, point.crack, point.plane);
+    for (const int side : {-1, 1})
+      if (faces[side > 0]) point.velocity(side) = *faces[side > 0];  // nothing near: as before
+  }
+  return told;
+}
+
+template <int Dim>
+void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
+  const auto n = static_cast<std::ptrdiff_t>(points.size());
+  for (std::ptrdiff_t k = 0; k < n; ++k) {
+    if (!points[k].own || points[k].filled) continue;
+    const auto on_line = [&](std::ptrdiff_t j) {
+      return j >= 0 && j < n && points[j].crack == points[k].crack && points[j].image == points[k].image;
+    };
+    const auto nearest = [&]() -> std::ptrdiff_t {
+      for (std::ptrdiff_t away = 1; on_line(k - away) || on_line(k + away); ++away)
+        for (const std::ptrdiff_t j : {k - away, k + away})
+          if (on_line(j) && points[j].filled) return j;
+      return k;
+    }();
+    points[k].lower_velocity = points[nearest].lower_velocity,
+    points[k].upper_velocity = points[nearest].upper_velocity;
+  }
+}
+
+#define CAIRN_INSTANTIATE(Dim)                                                                     \
+  template FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>&, const CrackPoint<Dim>&, int); \
+  template std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>&,        \
+                                                             const CrackSurroundings<Dim>&);       \
+  template void borrow_face_velocities(std::vector<CrackPoint<Dim>>&);
+CAIRN_INSTANTIATE(2)
+CAIRN_INSTANTIATE(3)
+#undef CAIRN_INSTANTIATE
+
+}  // namespace cairn

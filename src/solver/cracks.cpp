@@ -1,0 +1,180 @@
+// Cracks of a run: what they are, where they begin, and how patches come to know of them.
+
+#include <fmt/format.h>
+
+#include <map>
+
+#include "cairn/core/error.hpp"
+#include "cairn/io/agreement.hpp"
+#include "cairn/parallel/crack_exchange.hpp"
+#include "cairn/solver/simulation.hpp"
+
+namespace cairn {
+namespace {
+
+constexpr double segment_length = 0.5;            // cells, at set-up
+constexpr double on_crack = 1e-3, beside = 0.25;  // cells from a crack at which a point lies on it, or beside it
+constexpr double most_on_crack = 0.1;             // of the points beside it
+
+/// The crack's line in segments of at most half a cell.
+std::vector<Vec3> refined(const CrackSpec& spec, double spacing) {
+  std::vector<Vec3> points = {spec.points[0]};
+  for (std::size_t i = 1; i < spec.points.size(); ++i) {
+    const Vec3 from = spec.points[i - 1], step = spec.points[i] - from;
+    const int parts = std::max(1, static_cast<int>(std::ceil(step.norm() / (segment_length * spacing) - 1e-9)));
+    for (int k = 1; k < parts; ++k) points.push_back(from + step * (static_cast<double>(k) / parts));
+    points.push_back(spec.points[i]);
+  }
+  return points;
+}
+
+PairLaw law_between_faces(const CrackSpec& spec) {
+  if (spec.law == CrackLaw::stick) return {ContactLaw::stick, 0};
+  return {ContactLaw::friction, spec.law == CrackLaw::friction ? spec.friction : 0.0};
+}
+
+}  // namespace
+
+template <int Dim>
+void Simulation<Dim>::define_cracks(const Case& c) {
+  if (c.cracks.empty()) return;
+  specs_ = c.materials, j_radius_ = c.crack.j_radius;
+  for (const Body& body : bodies_) crack_densities_.push_back(body.rigid ? 0.0 : materials_[body.material].density);
+  for (const CrackSpec& spec : c.cracks) {
+    Crack crack;
+    crack.ends = {0, static_cast<int>(refined(spec, lattice_.smallest_spacing()).size()) - 1};
+    crack.open = {spec.ends[0] == CrackEnd::open, spec.ends[1] == CrackEnd::open};
+    crack.all_bodies = spec.groups.empty();
+    for (std::size_t b = 0; b < c.bodies.size() && !crack.all_bodies; ++b)
+      if (std::ranges::find(spec.groups, c.bodies[b].group) != spec.groups.end())
+        crack.bodies.push_back(static_cast<int>(b));
+    contact_.cracks.push_back({spec.law != CrackLaw::free, law_between_faces(spec), crack.all_bodies, crack.bodies});
+    cracks_.push_back(std::move(crack));
+  }
+}
+
+/// Calls f(crack, index, position, patch) for every point of the case's cracks, with the patch whose cells hold it.
+template <int Dim>
+template <class F>
+void Simulation<Dim>::for_crack_points(const Case& c, F&& f) const {
+  for (std::size_t k = 0; k < c.cracks.size(); ++k) {
+    const auto line = refined(c.cracks[k], lattice_.smallest_spacing());
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      const Vec<Dim> x = line[i].template head<Dim>();
+      Index<Dim> cell;
+      for (int d = 0; d < Dim; ++d)
+        cell[d] = std::clamp(static_cast<int>(std::floor(lattice_.scaled(d, x[d]))), 0, lattice_.cells()[d] - 1);
+      f(static_cast<int>(k), static_cast<int>(i), x, lattice_.patch_of_cell(cell));
+    }
+  }
+}
+
+template <int Dim>
+std::vector<PatchId> Simulation<Dim>::patches_of_cracks(const Case& c) const {
+  std::vector<PatchId> patches;
+  for_crack_points(c, [&](int, int, const Vec<Dim>&, PatchId patch) { patches.push_back(patch); });
+  std::ranges::sort(patches);
+  const auto rest = std::ranges::unique(patches);
+  patches.erase(rest.begin(), rest.end());
+  return patches;
+}
+
+/// Gives every crack point to the patch whose cells hold it.
+template <int Dim>
+void Simulation<Dim>::place_cracks(const Case& c) {
+  for_crack_points(c, [&](int crack, int index, const Vec<Dim>& x, PatchId id) {
+    CrackPoint<Dim> point;
+    point.crack = crack, point.index = index;
+    point.plane = point.lower = point.upper = x;
+    const auto patch = std::ranges::lower_bound(patches_, id, {}, &Patch<Dim>::id);
+    if (patch != patches_.end() && patch->id == id) patch->cracks.push_back(point);
+  });
+  receive_cracks();
+  check_points_on_cracks(c);
+}
+
+/// A crack along a row of points would part nothing there: no rule can say on which side they are. One point on a crack
+/// at a slant does no harm, and some are always there; so those count that make up a good part of the nearest ones of a
+/// patch.
+template <int Dim>
+void Simulation<Dim>::check_points_on_cracks(const Case& c) {
+  if (cracks_.empty()) return;
+  struct Count {
+    int on = 0, beside = 0;
+    Vec<Dim> first = Vec<Dim>::Zero();
+  };
+  std::string error;
+  const double h = lattice_.smallest_spacing();
+  for (auto& patch : patches_) {
+    find_cracks(patch);
+    const auto& segments = segments_of(patch);
+    std::map<std::pair<int, int>, Count> counts;  // by crack and body
+    for (const auto& piece : patch.pieces)
+      for (int p = 0; p < piece.points.size() && !is_rigid(piece); ++p) {
+        Vec<Dim> x;
+        for (int d = 0; d < Dim; ++d) x[d] = piece.points.column(d)[p];
+        for (const int s : segments.near(x, lattice_)) {
+          const auto& segment = segments.all()[s];
+          const Vec<Dim> e = segment.b - segment.a;
+          const double along = std::clamp((x - segment.a).dot(e) / e.squaredNorm(), 0.0, 1.0);
+          const double away = (segment.a + along * e - x).norm();
+          if (!cracks_[segment.crack].cuts(piece.body) || !(away < beside * h)) continue;
+          Count& count = counts[{segment.crack, piece.body}];
+          if (away < on_crack * h && count.on++ == 0) count.first = x;
+          ++count.beside;
+        }
+      }
+    for (const auto& [at, count] : counts)
+      if (error.empty() && count.on > 1 && count.on > most_on_crack * count.beside)
+        error = fmt::format(
+            "{}: crack {} goes along material points of body {}, from {:.6g}, {:.6g} m on, and would not part it "
+            "there; "
+            "shift the crack by {:.3g} m across its line",
+            c.cracks[at.first].source, at.first, at.second, count.first[0], count.first[1], 0.1 * h);
+  }
+  const std::string common = common_error(comm_, error);
+  if (!common.empty()) throw InputError(common);
+}
+
+template <int Dim>
+void Simulation<Dim>::find_cracks(Patch<Dim>& patch) {
+  if (!cracks_.empty()) segments_of(patch) = CrackSegments<Dim>(patch, lattice_, cracks_);
+}
+
+/// Cracks go with the material, as it moves in this step.
+template <int Dim>
+void Simulation<Dim>::move_cracks() {
+  if (cracks_.empty()) return;
+  exchange_face_velocities(*messages_, table_, patches_, lattice_, face_motions_);
+  for (auto& patch : patches_) {
+    borrow_face_velocities(patch.cracks);
+    for (auto& point : patch.cracks)
+      if (point.own) point.move(dt_);
+  }
+  for (auto& told : face_motions_) told.clear();
+  receive_cracks();
+}
+
+template <int Dim>
+void Simulation<Dim>::receive_cracks() {
+  if (cracks_.empty()) return;
+  const std::string failure = exchange_cracks(*messages_, table_, patches_, lattice_);
+  if (fault_urgency_ == 0 && !failure.empty()) fault_urgency_ = 1, fault_ = failure;
+  for (auto& patch : patches_)
+    if (!patch.cracks.empty())
+      for (auto& piece : patch.pieces) piece.projected = false;
+}
+
+#define CAIRN_INSTANTIATE(Dim)                                        \
+  template void Simulation<Dim>::define_cracks(const Case&);          \
+  template std::vector<PatchId> Simulation<Dim>::patches_of_cracks(const Case&) const; \
+  template void Simulation<Dim>::place_cracks(const Case&);           \
+  template void Simulation<Dim>::check_points_on_cracks(const Case&); \
+  template void Simulation<Dim>::find_cracks(Patch<Dim>&);            \
+  template void Simulation<Dim>::move_cracks();                       \
+  template void Simulation<Dim>::receive_cracks();
+CAIRN_INSTANTIATE(2)
+CAIRN_INSTANTIATE(3)
+#undef CAIRN_INSTANTIATE
+
+}  // namespace cairn

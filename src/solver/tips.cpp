@@ -1,0 +1,189 @@
+// Tips of cracks: J-integrals and stress intensities.
+
+#include <map>
+
+#include "cairn/solver/simulation.hpp"
+
+namespace cairn {
+namespace {
+
+/// Elastic constants at a tip where the law is linear for small strains; none else.
+template <int Dim>
+void set_moduli(CrackTip& tip, const Material& material) {
+  if (material.model != "hypoelastic" && material.model != "neo_hookean") return;
+  const double mu = material.parameters.at("shear_modulus"), bulk = material.parameters.at("bulk_modulus");
+  const double nu = (3 * bulk - 2 * mu) / (2 * (3 * bulk + mu)), E = 2 * mu * (1 + nu);
+  const bool strain = material.plane == Plane::strain;
+  tip.modulus = strain ? E / (1 - nu * nu) : E;
+  tip.kappa = strain ? 3 - 4 * nu : (3 - nu) / (1 + nu);
+  tip.shear_modulus = mu;
+}
+
+/// The numbers of all ranks one after the other, on every rank. Collective.
+std::vector<double> gather_everywhere(const std::vector<double>& mine, MPI_Comm comm) {
+  std::vector<double> all = gather_on_first(mine, comm);
+  auto size = static_cast<std::int64_t>(all.size());
+  MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
+  all.resize(static_cast<std::size_t>(size));
+  MPI_Bcast(all.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm);
+  return all;
+}
+
+/// Continuous distance from the tip, the shortest across periodic boundaries.
+template <int Dim>
+Vec<2> beside(const Lattice<Dim>& lattice, Vec<2> x, const Vec<2>& tip) {
+  for (int d = 0; d < 2; ++d)
+    if (lattice.periodic(d)) x[d] -= lattice.length(d) * std::round((x[d] - tip[d]) / lattice.length(d));
+  return x;
+}
+
+}  // namespace
+
+/// The tips, ascending in (crack, end), the same on every rank. Collective.
+template <int Dim>
+std::vector<CrackTip> Simulation<Dim>::find_tips() const {
+  std::vector<double> mine;
+  for (const auto& patch : patches_)
+    for (std::size_t k = 0; k < patch.cracks.size(); ++k) {
+      const auto& point = patch.cracks[k];
+      for (int end = 0; end < 2; ++end) {
+        const Crack& crack = cracks_[point.crack];
+        if (!point.own || crack.open[end] || point.index != crack.ends[end]) continue;
+        const auto& before = patch.cracks[end == 0 ? k + 1 : k - 1];
+        const Vec<Dim> ahead = (point.plane - before.plane).normalized();
+        mine.insert(mine.end(), {static_cast<double>(point.crack), static_cast<double>(end), point.plane[0],
+                                 point.plane[1], ahead[0], ahead[1]});
+      }
+    }
+  const std::vector<double> all = gather_everywhere(mine, comm_);
+  std::vector<CrackTip> tips;
+  for (std::size_t i = 0; i < all.size(); i += 6) {
+    CrackTip tip;
+    tip.crack = static_cast<int>(all[i]), tip.end = static_cast<int>(all[i + 1]);
+    tip.position = {all[i + 2], all[i + 3]}, tip.ahead = {all[i + 4], all[i + 5]};
+    tips.push_back(tip);
+  }
+  std::sort(tips.begin(), tips.end(),
+            [](const CrackTip& a, const CrackTip& b) { return std::pair(a.crack, a.end) < std::pair(b.crack, b.end); });
+  return tips;
+}
+
+/// Accelerations and velocities of nodes as in a step from here, contact included, without changing anything that
+/// stays.
+template <int Dim>
+void Simulation<Dim>::find_motion() {
+  ContactSettings<Dim> contact = contact_;
+  contact.keep_contacts = false;
+  // Before the first step: that of a wave.
+  const double dt = dt_ > 0 ? dt_ : limits_.cfl * lattice_.smallest_spacing() / maxima_[0];
+  std::vector<PatchLedger> ledgers;
+  for (const auto& patch : patches_) ledgers.push_back(patch.ledger);
+  exchange_->begin_sums(transfer_.extras);
+  exchange_after([&](std::size_t, Patch<Dim>& patch) { project_points(patch); });
+  for_patches([&](std::size_t p, Patch<Dim>& patch) {
+    exchange_->add(patch, p);
+    mirror_sums(patch, lattice_, contact.faces);
+    sweeps_[p].find(patch, lattice_, contact, bodies_);
+    sweeps_[p].first_pass(patch, lattice_, contact, dt);
+    sweeps_[p].second_pass(patch, lattice_, contact, dt, true);
+    for (auto& piece : patch.pieces) integrate(piece, dt), piece.projected = false;
+    constrain_motion(patch, lattice_, contact.faces, bodies_, dt, true);
+  });
+  for (std::size_t p = 0; p < patches_.size(); ++p) patches_[p].ledger = ledgers[p];
+}
+
+/// What a patch's points add to the tips' integrals.
+template <int Dim>
+void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip>& tips,
+                                    std::vector<TipSums>& sums) const {
+  using C = PointColumns<Dim>;
+  const double h = lattice_.smallest_spacing(), inner = j_radius_[0] * h, outer = j_radius_[1] * h;
+  for (const auto& piece : patch.pieces) {
+    if (is_rigid(piece) || piece.points.size() == 0) continue;
+    const Points<Dim>& points = piece.points;
+    const SolverMaterial& material = material_of(piece);
+    std::vector<std::array<double, Dim + Dim * Dim>> kinematics;  // where a tip is near
+    std::visit(
+        [&](const auto& law) {
+          std::array<double, state_capacity> state{};
+          for (std::size_t t = 0; t < tips.size(); ++t)
+            for (int p = 0; p < points.size(); ++p) {
+              if (!cracks_[tips[t].crack].cuts(piece.body)) break;
+              TipPoint at;
+              at.position = beside(lattice_, Vec<2>(points.column(0)[p], points.column(1)[p]), tips[t].position);
+              if ((at.position - tips[t].position).squaredNorm() >= outer * outer) continue;
+              if (kinematics.empty()) kinematics = point_kinematics(piece, lattice_, transfer_);
+              Tensor<Dim, double> F;
+              for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
+              for (int i = 0; i < 2; ++i) {
+                at.velocity[i] = points.column(C::velocity + i)[p], at.acceleration[i] = kinematics[p][i];
+                for (int j = 0; j < 2; ++j) {
+                  at.stress(i, j) = points.column(C::stress + symmetric_index<Dim>(i, j))[p];
+                  at.H(i, j) = F.c[tensor_index<Dim>(i, j)] - (i == j);
+                  at.L(i, j) = kinematics[p][Dim + Dim * i + j];
+                }
+              }
+              const double J = determinant(F);
+              at.volume = J * points.column(C::volume)[p], at.density = material.density / J;
+              for (int s = 0; s < points.columns() - C::state; ++s) state[s] = points.column(C::state + s)[p];
+              at.energy = law.strain_energy(F, state.data()) / J;
+              const TipSums add = tip_terms(tips[t], at, inner, outer);
+              sums[t].J += add.J, sums[t].J_static += add.J_static;
+              sums[t].I_opening += add.I_opening, sums[t].I_sliding += add.I_sliding;
+            }
+        },
+        material.law);
+  }
+}
+
+template <int Dim>
+std::vector<TipState> Simulation<Dim>::tip_states() {
+  if constexpr (Dim == 3) return {};
+  if (cracks_.empty()) return {};
+  finish_speed_reduction();
+  std::vector<CrackTip> tips = find_tips();
+  if (tips.empty()) return {};
+  for (CrackTip& tip : tips) {
+    const auto& cut = cracks_[tip.crack];
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
+      if (cut.cuts(static_cast<int>(b)) && !bodies_[b].rigid) {
+        set_moduli<Dim>(tip, specs_[bodies_[b].material]);
+        break;
+      }
+  }
+  find_motion();
+  std::vector<double> mine;
+  for (const auto& patch : patches_) {
+    std::vector<TipSums> sums(tips.size());
+    add_tip_terms(patch, tips, sums);
+    mine.push_back(patch.id);
+    for (const TipSums& s : sums) mine.insert(mine.end(), {s.J, s.J_static, s.I_opening, s.I_sliding});
+  }
+  const std::vector<double> all = gather_everywhere(mine, comm_);
+  const std::size_t row = 1 + TipSums::size * tips.size();
+  std::map<int, const double*> by_patch;
+  for (std::size_t i = 0; i < all.size(); i += row) by_patch[static_cast<int>(all[i])] = &all[i + 1];
+  std::vector<TipState> states;
+  for (std::size_t t = 0; t < tips.size(); ++t) {
+    TipSums sum;
+    for (const auto& [patch, values] : by_patch) {
+      const double* v = values + TipSums::size * t;
+      sum.J += v[0], sum.J_static += v[1], sum.I_opening += v[2], sum.I_sliding += v[3];
+    }
+    const double half = tips[t].modulus > 0 ? 0.5 * tips[t].modulus : std::numeric_limits<double>::quiet_NaN();
+    states.push_back({tips[t], sum.J, sum.J_static, half * sum.I_opening, half * sum.I_sliding});
+  }
+  return states;
+}
+
+#define CAIRN_INSTANTIATE(Dim)                                                                                         \
+  template std::vector<CrackTip> Simulation<Dim>::find_tips() const;                                                   \
+  template void Simulation<Dim>::find_motion();                                                                        \
+  template void Simulation<Dim>::add_tip_terms(const Patch<Dim>&, const std::vector<CrackTip>&, std::vector<TipSums>&) \
+      const;                                                                                                           \
+  template std::vector<TipState> Simulation<Dim>::tip_states();
+CAIRN_INSTANTIATE(2)
+CAIRN_INSTANTIATE(3)
+#undef CAIRN_INSTANTIATE
+
+}  // namespace cairn

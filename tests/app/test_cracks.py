@@ -1,0 +1,129 @@
+"""Cracks through whole runs: the same bits on any number of ranks and after a restart on another, errors of the case.
+
+    test_cracks.py CAIRN SCRATCH
+"""
+
+import sys
+from pathlib import Path
+
+from harness import ROOT, Program, fresh_folder, load_compare_runs, sets
+
+compare_runs = load_compare_runs()
+import h5py  # noqa: E402  after the check that it is there
+import numpy as np  # noqa: E402
+
+# Two disks that collide, each cut by a crack: one from side to side, one with a tip inside, and one within.
+CRACKS = """
+[[cracks]]
+points = [[0.13, 0.36], [0.35, 0.363], [0.57, 0.35]]
+law = "friction"
+friction = 0.2
+bodies = ["left"]
+
+[[cracks]]
+points = [[0.6441, 0.86], [0.6441, 0.631]]
+ends = ["open", "tip"]
+law = "frictionless"
+
+[[cracks]]
+points = [[0.3213, 0.2731], [0.4137, 0.3127]]
+ends = ["tip", "tip"]
+"""
+SETTINGS = {"time.steps": 60, "domain.cells": "[25, 25]", "domain.patch_cells": 5, "output.history": "{ every = 5 }",
+            "output.particles": "{ every = 20 }", "output.contacts": "{ every = 20 }",
+            "output.checkpoint": "{ every = 30, keep = 5 }", "output.grains": "{ every = 20 }",
+            "bodies.0.shape.centre": "[0.3537, 0.3613]", "bodies.1.shape.centre": "[0.6441, 0.6329]",
+            "bodies.0.velocity": "[2.0, 1.2]", "bodies.1.velocity": "[-2.0, -1.6]", "bodies.0.angular_velocity": 3.0,
+            "bodies.0.group": '"left"'}
+ERRORS = {  # what is wrong, and a part of the message
+    "points = [[0.2, 0.3]]": "needs at least 2",
+    "points = [[0.2, 0.3], [1.4, 0.3]]": "lies outside the domain",
+    "points = [[0.2, 0.3], [0.2, 0.3]]": "are the same",
+    'points = [[0.05, 0.3], [0.3, 0.3]]\nends = ["tip", "tip"]': "lies in no body",
+    "points = [[0.2, 0.3], [0.3, 0.31]]": "lies inside a body",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nends = ["open"]': "give two of",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "glue"': "is not a choice",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "stick"\nfriction = 0.1': "only for cracks with law",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nbodies = ["nobody"]': "no body has the group",
+}
+
+
+def crack_rows(folder: Path, name: str) -> np.ndarray:
+    with h5py.File(folder / name) as file:
+        rows = np.column_stack([file["crack"][:], file["index"][:], file["lower"][:], file["upper"][:]])
+    return rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+
+
+def differences(a: Path, b: Path) -> list[str]:
+    in_a, in_b = compare_runs.result_files(a), compare_runs.result_files(b)
+    lines = [f"{name} is in one folder only" for name in sorted(in_a ^ in_b)]
+    for name in sorted(in_a & in_b):
+        lines += [f"{name}: {line}" for line in compare_runs.compare_files(a / name, b / name)]
+    return lines
+
+
+def check_same_bits(cairn: Program, case: Path, scratch: Path) -> list[str]:
+    failures = []
+    for ranks in (1, 2, 3, 5):
+        done = cairn("run", case, "--out", scratch / f"ranks_{ranks}", *sets(SETTINGS), ranks=ranks, timeout=300)
+        if done.code != 0:
+            return [f"on {ranks} ranks: exit code {done.code}: {done.err}"]
+        if ranks > 1:
+            different = differences(scratch / "ranks_1", scratch / f"ranks_{ranks}")
+            failures += [f"on {ranks} ranks: {line}" for line in different[:5]]
+    first, last = (crack_rows(scratch / "ranks_1", f"cracks_{n:06}.h5") for n in (0, 3))
+    if first.shape != last.shape or not np.array_equal(first[:, :2], last[:, :2]):
+        failures.append("crack points came or went")
+    elif not 1e-4 < np.abs(first[:, 2:] - last[:, 2:]).max() < 0.5:
+        failures.append("the cracks did not go with the disks")
+    if not np.abs(last[:, 2:5] - last[:, 5:8]).max() > 1e-5:
+        failures.append("no crack opened or slipped")
+    with h5py.File(scratch / "ranks_1" / "tips_000003.h5") as file:
+        if file["crack"].shape != (3,) or not np.isfinite(file["J"][:]).all():
+            failures.append(f"tips: {file['crack'][:]}, J {file['J'][:]}")
+    return failures
+
+
+def check_restart(cairn: Program, case: Path, scratch: Path) -> list[str]:
+    """From the checkpoint at step 30 of one rank, on three."""
+    settings = sets(SETTINGS)
+    checkpoint = scratch / "ranks_1" / "checkpoint_000000.h5"
+    done = cairn("run", case, "--out", scratch / "restarted", "--restart", checkpoint, *settings, ranks=3, timeout=300)
+    if done.code != 0:
+        return [f"restart: exit code {done.code}: {done.err}"]
+    failures = []
+    for name in ("particles_000003.vtkhdf", "cracks_000003.h5", "tips_000003.h5"):
+        with h5py.File(scratch / "ranks_1" / name) as a, h5py.File(scratch / "restarted" / name) as b:
+            for key in a:
+                if isinstance(a[key], h5py.Dataset) and a[key][()].tobytes() != b[key][()].tobytes():
+                    failures.append(f"restart: {name}: {key} differs")
+    return failures
+
+
+def check_errors(cairn: Program, plain: str, scratch: Path) -> list[str]:
+    failures = []
+    for text, message in ERRORS.items():
+        case = scratch / "wrong.toml"
+        case.write_text(plain + "\n[[cracks]]\n" + text + "\n")
+        done = cairn("check", case)
+        if done.code != 2 or message not in done.err + done.out:
+            failures.append(f"{text!r}: exit code {done.code}, {done.err or done.out}")
+    return failures
+
+
+def main() -> int:
+    cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
+    plain = (ROOT / "cases" / "two_disks.toml").read_text()
+    case = scratch / "cracked_disks.toml"
+    case.write_text(plain + CRACKS)
+    failures = check_same_bits(cairn, case, scratch)
+    failures = failures or check_restart(cairn, case, scratch)
+    failures += check_errors(cairn, plain, scratch)
+    for failure in failures:
+        print(failure)
+    print("FAILED" if failures else "passed")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

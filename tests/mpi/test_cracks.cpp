@@ -1,0 +1,91 @@
+// Cut bodies on any number of ranks: every bit of points and crack points is that of one rank, and momentum stays.
+
+#include <gtest/gtest.h>
+#include <mpi.h>
+
+#include "../support/crack_cases.hpp"
+
+namespace cairn {
+namespace {
+
+using namespace test;
+
+std::map<std::pair<int, int>, CrackPoint<2>> crack_points_of(const Simulation<2>& simulation) {
+  std::map<std::pair<int, int>, CrackPoint<2>> all;
+  for (const auto& patch : simulation.patches())
+    for (const auto& point : patch.cracks)
+      if (point.own && !all.emplace(std::pair(point.crack, point.index), point).second)
+        ADD_FAILURE() << "crack point " << point.index << " is there twice";
+  return all;
+}
+
+void check_cracks(Case c, int steps) {
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  c.parallel.balance_every = 10, c.parallel.imbalance = 1.01;
+  for (Partition partition : {Partition::metis, Partition::round_robin}) {
+    c.parallel.partition = partition;
+    Simulation<2> shared(c, MPI_COMM_WORLD), alone(c, MPI_COMM_SELF);
+    const auto v = [](const Vec<2>& x) -> Vec<2> { return {x.y() > 0.5 ? 0.3 : -0.2, x.x() > 0.45 ? -0.1 : 0.2}; };
+    set_velocities(shared, v), set_velocities(alone, v);
+    const Totals start = shared.totals();
+    const auto at_first = crack_points_of(alone);
+    for (int i = 0; i < steps; ++i) shared.step(1e300), alone.step(1e300);
+    EXPECT_EQ(shared.time(), alone.time());
+    const auto all = points_of(alone);
+    for (const auto& [id, a] : points_of(shared)) {
+      ASSERT_EQ(a.x, all.at(id).x);
+      ASSERT_EQ(a.v, all.at(id).v);
+      for (int i = 0; i < symmetric_size<2>; ++i) ASSERT_EQ(a.stress.c[i], all.at(id).stress.c[i]);
+    }
+    const auto cracks = crack_points_of(alone), mine = crack_points_of(shared);
+    double moved = 0;
+    for (const auto& [at, point] : mine) {
+      ASSERT_EQ(point.plane, cracks.at(at).plane);
+      ASSERT_EQ(point.lower, cracks.at(at).lower);
+      ASSERT_EQ(point.upper, cracks.at(at).upper);
+      moved = std::max(moved, (point.plane - at_first.at(at).plane).norm());
+    }
+    std::int64_t count = std::ssize(mine);
+    MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
+    EXPECT_EQ(count, std::ssize(cracks)) << "crack points were lost";
+    EXPECT_EQ(cracks.size(), at_first.size());
+    const Totals now = shared.totals(), reference = alone.totals();
+    if (rank != 0) continue;
+    EXPECT_LE((now.momentum - start.momentum).norm(), 1e-13 * start.mass * (0.3 + c.bodies[0].velocity.norm()));
+    EXPECT_EQ(now.momentum, reference.momentum);
+    EXPECT_EQ(now.energy(), reference.energy());
+    if (c.solver.stress_update == StressUpdate::both) {
+      EXPECT_NEAR(now.energy(), start.energy(), 0.01 * start.kinetic);
+    }
+  }
+}
+
+TEST(CracksOnRanks, ABodyInFourParts) {
+  Case c = block_at_rest();
+  for (const auto& line : crossing_cracks()) add_crack(c, line, CrackLaw::friction);
+  check_cracks(c, 80);
+}
+TEST(CracksOnRanks, FreeParts) {
+  Case c = block_at_rest();
+  for (const auto& line : wavy_crack()) add_crack(c, line, CrackLaw::free);
+  check_cracks(c, 80);
+}
+TEST(CracksOnRanks, AcrossPeriodicBoundaries) {
+  Case c = block_at_rest();
+  c.domain.periodic = {true, true, false};
+  for (const auto& line : star_cracks(3)) add_crack(c, line, CrackLaw::friction);
+  c.bodies[0].velocity = Vec3(5, 3, 0);
+  check_cracks(c, 80);
+}
+TEST(CracksOnRanks, OtherStressUpdates) {
+  Case c = block_at_rest();
+  for (const auto& line : star_cracks(2)) add_crack(c, line, CrackLaw::friction);
+  for (StressUpdate update : {StressUpdate::first, StressUpdate::last, StressUpdate::modified_last}) {
+    c.solver.stress_update = update;
+    check_cracks(c, 60);
+  }
+}
+
+}  // namespace
+}  // namespace cairn
