@@ -70,8 +70,8 @@ CrackPoint<Dim> take_crack_point(const Message& message, std::size_t& at) {
 }
 
 template <int Dim>
-std::string exchange_cracks(NeighbourExchange& messages, const PatchTable<Dim>& table,
-                            std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice) {
+std::string exchange_cracks(NeighbourExchange& messages, const PatchTable<Dim>& table, std::vector<Patch<Dim>>& patches,
+                            const Lattice<Dim>& lattice) {
   messages.begin();
   std::string failure;
   for (auto& patch : patches) {

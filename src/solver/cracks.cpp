@@ -165,13 +165,13 @@ void Simulation<Dim>::receive_cracks() {
       for (auto& piece : patch.pieces) piece.projected = false;
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                        \
-  template void Simulation<Dim>::define_cracks(const Case&);          \
+#define CAIRN_INSTANTIATE(Dim)                                                         \
+  template void Simulation<Dim>::define_cracks(const Case&);                           \
   template std::vector<PatchId> Simulation<Dim>::patches_of_cracks(const Case&) const; \
-  template void Simulation<Dim>::place_cracks(const Case&);           \
-  template void Simulation<Dim>::check_points_on_cracks(const Case&); \
-  template void Simulation<Dim>::find_cracks(Patch<Dim>&);            \
-  template void Simulation<Dim>::move_cracks();                       \
+  template void Simulation<Dim>::place_cracks(const Case&);                            \
+  template void Simulation<Dim>::check_points_on_cracks(const Case&);                  \
+  template void Simulation<Dim>::find_cracks(Patch<Dim>&);                             \
+  template void Simulation<Dim>::move_cracks();                                        \
   template void Simulation<Dim>::receive_cracks();
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

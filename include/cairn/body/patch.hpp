@@ -84,7 +84,9 @@ struct Patch {
   }
 
   /// Whether nothing has to be remembered of it: sums over all patches may leave it out.
-  bool blank() const { return point_count() == 0 && contacts.empty() && tools.empty() && cracks.empty() && ledger == PatchLedger{}; }
+  bool blank() const {
+    return point_count() == 0 && contacts.empty() && tools.empty() && cracks.empty() && ledger == PatchLedger{};
+  }
 
   std::int64_t point_count() const {
     std::int64_t n = 0;

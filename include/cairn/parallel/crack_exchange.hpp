@@ -14,11 +14,11 @@ namespace cairn {
 inline constexpr double crack_reach = 4;
 
 /// Sends the patches' own crack points, which may have moved up to a patch, to the patches whose cells hold them now
-/// and to those nearby, where these are in the table. Lists become ascending; the same on any number of ranks. Collective. What went wrong on this
-/// rank, empty if nothing: a point that left the domain or moved further.
+/// and to those nearby, where these are in the table. Lists become ascending; the same on any number of ranks.
+/// Collective. What went wrong on this rank, empty if nothing: a point that left the domain or moved further.
 template <int Dim>
-std::string exchange_cracks(NeighbourExchange& messages, const PatchTable<Dim>& table,
-                            std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice);
+std::string exchange_cracks(NeighbourExchange& messages, const PatchTable<Dim>& table, std::vector<Patch<Dim>>& patches,
+                            const Lattice<Dim>& lattice);
 
 /// Tells the owners of crack points what their neighbours found of faces that lie with them; `told` for each patch.
 /// Where several tell, the patch that comes first counts. Collective.

@@ -51,7 +51,7 @@ class Checkpoint {
   std::string case_text_;
   std::vector<PatchId> patches_;
   std::vector<std::int64_t> points_, pieces_, contacts_, tools_;  // of each
-  std::vector<std::int64_t> cracks_;  // crack points; empty where the case has no cracks
+  std::vector<std::int64_t> cracks_;                              // crack points; empty where the case has no cracks
 };
 
 }  // namespace cairn
