@@ -52,14 +52,13 @@ SideSet sides_seen(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& 
              near = around.segments.near(face, around.lattice);
   const SideSet own = around.segments.crossed(near_start, start, node, body, around.cracks).sides;
   const SideSet others = around.segments.crossed(near, face, node, body, around.cracks).sides;
-  std::array<int, 2 * SideSet::most> list;
-  int n = 0;
+  std::vector<int> list;
   for (int k = 0; k < others.size(); ++k)
-    if (others.crack(k) != point.crack) list[n++] = others.crack(k);
-  if (own.contains(point.crack)) list[n++] = point.crack;
-  std::sort(list.begin(), list.begin() + n);
+    if (others.crack(k) != point.crack) list.push_back(others.crack(k));
+  if (own.contains(point.crack)) list.push_back(point.crack);
+  std::sort(list.begin(), list.end());
   SideSet sides;
-  for (int k = 0; k < std::min(n, SideSet::most); ++k) sides = sides.with(list[k]);
+  for (std::size_t k = 0; k < std::min<std::size_t>(list.size(), SideSet::most); ++k) sides = sides.with(list[k]);
   return sides;
 }
 

@@ -51,7 +51,8 @@ bool at_face(const Index<Dim>& place, int face, const Lattice<Dim>& lattice) {
 /// Share of a node in sums over a patch: 0 where another patch answers for it. On a symmetry plane sums hold both
 /// halves; beyond it they are the image of those inside.
 template <int Dim>
-double node_share(int patch, const Index<Dim>& place, const Lattice<Dim>& lattice, const FaceConditions<Dim>& faces) {
+double node_share(PatchId patch, const Index<Dim>& place, const Lattice<Dim>& lattice,
+                  const FaceConditions<Dim>& faces) {
   double share = lattice.owns_node(patch, place) ? 1.0 : 0.0;
   for (int face = 0; face < 2 * Dim; ++face)
     if (faces[face].type == FaceType::symmetry && at_face<Dim>(place, face, lattice))
