@@ -15,7 +15,7 @@ from pathlib import Path
 
 from harness import PATIENCE, ROOT, Program, fresh_folder
 
-# The tutorial is a session of its own: test_tutorial.py runs it.
+# The tutorial is run from its first line to its last by test_tutorial.py.
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
          *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page.name != "tutorial.md")]
 SHOWN = re.compile(r"(?:[A-Z_]+=\S+ )*(cairn|mpirun|scripts/\S+|build/\S+|ctest|cmake|git|export)\b.*")
