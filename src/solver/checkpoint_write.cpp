@@ -95,17 +95,20 @@ Layout layout_of(const Simulation<Dim>& simulation) {
 template <int Dim>
 using PatchList = std::vector<const Patch<Dim>*>;
 
+/// Writes how many rows of some table every patch has.
+template <int Dim>
+void write_counts(ColumnWriter<Dim>& out, const Layout& layout, const char* name, const Counts& counts) {
+  std::vector<std::int64_t> mine;
+  for (const std::size_t place : layout.here) mine.push_back(counts[place]);
+  out.write(name, 1, layout.one_each(), mine);
+}
+
 template <int Dim>
 void write_patches(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const Layout& layout) {
   using P = Patch<Dim>;
   out.template write_patches<std::int64_t>("patch_id", [](const P& p) { return p.id; });
-  const auto write_counts = [&](const char* name, const Counts& counts) {
-    std::vector<std::int64_t> mine;
-    for (const std::size_t place : layout.here) mine.push_back(counts[place]);
-    out.write(name, 1, layout.one_each(), mine);
-  };
-  write_counts("patch_points", layout.points), write_counts("patch_pieces", layout.pieces);
-  write_counts("patch_contacts", layout.contacts), write_counts("patch_tools", layout.tools);
+  write_counts(out, layout, "patch_points", layout.points), write_counts(out, layout, "patch_pieces", layout.pieces);
+  write_counts(out, layout, "patch_contacts", layout.contacts), write_counts(out, layout, "patch_tools", layout.tools);
   for (const auto& column : ledger_columns)
     out.template write_patches<double>(column.name, [&](const P& p) { return p.ledger.*column.value; });
 
@@ -177,8 +180,7 @@ void write_cracks(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const L
   for_own([&](const CrackPoint<Dim>& p) {
     numbers.insert(numbers.end(), {p.crack, p.index, p.filled, p.image[0], p.image[1], p.image[2]});
   });
-  out.template write_patches<std::int64_t>(patch_cracks_name,
-                                           [&](const auto& patch) { return layout.cracks[patch.id]; });
+  write_counts(out, layout, patch_cracks_name, layout.cracks);
   out.write("crack_numbers", crack_numbers, layout.cracks, numbers);
   for (const auto& vector : crack_vectors<Dim>) {
     values.clear();
