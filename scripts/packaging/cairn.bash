@@ -1,4 +1,4 @@
-# Completion of `cairn` for bash; installed where bash-completion looks for it, or: source packaging/cairn.bash
+# Completion of `cairn` for bash; installed where bash-completion looks for it, or: source scripts/packaging/cairn.bash
 # shellcheck shell=bash
 
 _cairn() {
