@@ -51,8 +51,7 @@ template <int Dim>
 void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice,
                                     const ContactSettings<Dim>& settings, double dt, bool last) {
   const bool only_first = settings.options.passes == Passes::before;
-  patch.ledger.contact_nodes = 0;
-  for (auto& [tool, sum] : patch.tools) sum.last = {};
+  patch.forget_last_step();
   for (const auto& node : nodes_) {
     load_node(node, patch, Pass::second, dt);
     if (!only_first) solve(node, patch, lattice, settings, dt, Pass::second);

@@ -323,6 +323,8 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   contact_.chords = c.solver.stress_update == StressUpdate::both;
   bodies_ = make_bodies(c, materials_);
   tools_ = make_tools(c, bodies_);
+  for (std::size_t b = 0; b < bodies_.size(); ++b)
+    if (bodies_[b].tool >= 0 && tools_[bodies_[b].tool].moves()) moved_bodies_.push_back(static_cast<int>(b));
   has_pistons_ = std::ranges::any_of(tools_, [](const Tool& tool) { return tool.piston.mass > 0; });
   contact_.keep_tools = c.output.forces.active() || has_pistons_;
   speeds_.wave = first_step(c).wave_speed;

@@ -4,13 +4,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <set>
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/agreement.hpp"
-#include "cairn/parallel/balance.hpp"
-#include "fault.hpp"
-#include "point_budget.hpp"
 
 namespace cairn {
 namespace {
@@ -269,44 +265,6 @@ void Simulation<Dim>::finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double 
   });
 }
 
-/// The stress of a driven body turns with it: its nodes have the velocity of the rigid motion, whose gradient is its
-/// spin.
-template <int Dim>
-void Simulation<Dim>::turn_stress(Piece<Dim>& piece) {
-  const auto& material = material_of(piece);
-  if (material.rigid || !turns_rigidly(piece)) return;
-  velocities_.lend(piece.nodes.velocity);
-  velocity_from_sums(piece);
-  SpeedLimits unlimited;  // no wave runs through it
-  update_stress(piece, lattice_, transfer_, material.law, material.density, dt_, unlimited);
-  if (!std::isfinite(unlimited.wave)) speeds_.wave = unlimited.wave;
-}
-
-/// Points of a rigid body turn about its centre, which travels with its tool.
-template <int Dim>
-void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
-  using C = PointColumns<Dim>;
-  const Body& body = bodies_[piece.body];
-  const Tool& tool = tools_[body.tool];
-  Points<Dim>& points = piece.points;
-  const Vec3 spin = tool.spin_of_step(), way = dt_ * tool.of_step(), centre = body.centre + tool.travel;
-  const double speed = spin.norm();
-  const Vec3 axis = speed > 0 ? Vec3(spin / speed) : Vec3::UnitZ();
-  const Mat3 turn = Eigen::AngleAxisd(speed * dt_, axis).toRotationMatrix();
-  for (int p = 0; p < points.size(); ++p) {
-    Vec3 arm = Vec3::Zero();
-    for (int d = 0; d < Dim; ++d) arm[d] = points.column(d)[p] + points.images()[p][d] * lattice_.length(d) - centre[d];
-    const Vec3 turned = speed > 0 ? Vec3(turn * arm) : arm;
-    const Vec3 velocity = tool.next + tool.spin_next.cross(turned);
-    for (int d = 0; d < Dim; ++d) {
-      points.column(d)[p] += way[d] + turned[d] - arm[d];
-      points.column(C::velocity + d)[p] = velocity[d];
-    }
-    for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = tool.spin_next[Dim == 2 ? 2 : s];
-    speeds_.point = std::max(speeds_.point, velocity.norm());
-  }
-}
-
 template <int Dim>
 void Simulation<Dim>::receive_points() {
   const auto time = timers_.measure(Stage::migrate);
@@ -317,62 +275,6 @@ void Simulation<Dim>::receive_points() {
   if ((steps_ + 1) % sort_interval == 0)
     for (auto& patch : patches_)
       for (auto& piece : patch.pieces) sort_by_cell(piece, lattice_, patch.cells);
-}
-
-/// Notes which point a stage found to be inverted or not finite. What it did to others in later stages does not matter:
-/// the most urgent fault of all ranks is the one reported, that of the earliest stage.
-template <int Dim>
-void Simulation<Dim>::look_for_fault(int urgency) {
-  if (fault_urgency_ > 0 || (std::isfinite(speeds_.wave) && std::isfinite(speeds_.point))) return;
-  const Fault fault = find_fault(patches_, bodies_);
-  fault_urgency_ = 10 * urgency + fault.kind;
-  fault_ = fault.text;
-}
-
-/// They take part in the rest of the step as mass without stress, and leave at its end.
-template <int Dim>
-void Simulation<Dim>::mark_faults(Piece<Dim>& piece) {
-  using C = PointColumns<Dim>;
-  Points<Dim>& points = piece.points;
-  for (int p = 0; p < points.size(); ++p) {
-    if (is_lost(points.ids()[p])) continue;
-    const Fault fault = fault_of(points, p, piece.body);
-    if (fault.kind == Fault::none) continue;
-    notes_.push_back(fmt::format("step {}: {}; it is dropped", steps_ + 1, fault.text));
-    marked_ = true;
-    mark_lost(points.ids()[p]);
-    for (int d = 0; d < Dim; ++d) {
-      if (!std::isfinite(points.column(d)[p]))
-        points.column(d)[p] = lattice_.node_position(d, piece.nodes.box.lower[d] + 1);
-      if (!std::isfinite(points.column(C::velocity + d)[p])) points.column(C::velocity + d)[p] = 0;
-    }
-    for (int c = C::spin; c < C::volume; ++c) points.column(c)[p] = 0;
-    for (int i = 0; i < 3; ++i) points.column(C::deformation + tensor_index<Dim>(i, i))[p] = 1;
-    for (int c = C::state; c < points.columns(); ++c)
-      if (!std::isfinite(points.column(c)[p])) points.column(c)[p] = 0;
-  }
-}
-
-template <int Dim>
-void Simulation<Dim>::book_departures(Patch<Dim>& patch, const Piece<Dim>& piece,
-                                      std::span<const Departure> departing) {
-  PatchLedger& ledger = patch.ledger;
-  for (const auto& [point, lost] : departing) {
-    ++(lost.empty() ? ledger.points_left : ledger.points_lost);
-    if (!lost.empty() && !is_lost(piece.points.ids()[point]))
-      notes_.push_back(fmt::format("step {}: {}; it is dropped", steps_ + 1, lost));
-  }
-  for_budgets(
-      piece, material_of(piece), is_rigid(piece), lattice_, transfer_, static_cast<int>(departing.size()),
-      [&](int i) { return departing[i].point; },
-      [&](int, const PointBudget& b) {
-        ledger.mass_left += b.mass;
-        if (!std::isfinite(b.energy())) return;  // no number to book
-        ledger.energy_left += b.energy();
-        ledger.blended_and_spun -= b.spin;
-        ledger.momentum_left_x += b.momentum[0], ledger.momentum_left_y += b.momentum[1];
-        ledger.momentum_left_z += b.momentum[2];
-      });
 }
 
 template <int Dim>
@@ -399,83 +301,6 @@ void Simulation<Dim>::finish_speed_reduction() {
     throw RunError(
         fmt::format("step {}: {}", steps_, common_error(comm_, fault_urgency_ == maxima_[2] ? fault_ : std::string())));
   if (maxima_[5] > 0) add_new_patches();
-}
-
-/// Points are in patches that had none before: their neighbours have to exist before nodes are exchanged.
-template <int Dim>
-void Simulation<Dim>::add_new_patches() {
-  const auto time = timers_.measure(Stage::migrate);
-  maxima_[5] = 0;
-  for (const PatchId id : table_.fill(gather_on_all(migration_->entered(), comm_)))
-    if (table_.owner(id) == rank_) patches_.emplace_back(id, lattice_);
-  std::ranges::sort(patches_, {}, &Patch<Dim>::id);
-  connect_patches();
-}
-
-template <int Dim>
-void Simulation<Dim>::connect_patches() {
-  std::set<int> neighbours;
-  for (const auto& patch : patches_)
-    for (const auto& link : patch.links)
-      if (table_.find(link.patch) >= 0) neighbours.insert(table_.owner(link.patch));
-  neighbours.erase(rank_);
-  sweeps_.assign(patches_.size(), {}), segments_.assign(patches_.size(), {});
-  face_motions_.assign(patches_.size(), {});
-  const Traffic traffic = messages_ ? messages_->traffic() : Traffic{};
-  messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
-  messages_->traffic() = traffic;
-  exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, table_, patches_);
-  beside_others_.clear();
-  for (std::size_t p = 0; p < patches_.size(); ++p) beside_others_.push_back(exchange_->beside_others(p));
-  Exits<Dim> exits;
-  for (int face = 0; face < 2 * Dim; ++face)
-    exits.open[face] = contact_.faces[face].type == FaceType::free && contact_.faces[face].leaving == Leaving::remove;
-  exits.drop_lost = solver_.lost_points == LostPoints::drop;
-  exits.book = [this](auto&&... departing) { book_departures(departing...); };
-  migration_ = std::make_unique<Migration<Dim>>(*messages_, table_, std::move(exits));
-}
-
-/// Bodies that move on leave empty patches behind. Where these have become many, those without a history go.
-template <int Dim>
-void Simulation<Dim>::forget_blank_patches() {
-  enum : std::uint8_t { blank, kept, filled };
-  std::vector<std::uint8_t> uses(table_.size(), blank);
-  for (const auto& patch : patches_)
-    uses[table_.find(patch.id)] = patch.point_count() > 0 ? filled : patch.blank() ? blank : kept;
-  MPI_Allreduce(MPI_IN_PLACE, uses.data(), static_cast<int>(uses.size()), MPI_UINT8_T, MPI_MAX, comm_);
-  constexpr std::size_t few = 64;
-  if (static_cast<std::size_t>(std::ranges::count(uses, blank)) < 2 * blank_before_ + few) return;
-  std::vector<PatchId> with_points, others;
-  for (std::size_t p = 0; p < uses.size(); ++p)
-    if (uses[p] != blank) (uses[p] == filled ? with_points : others).push_back(table_.patches()[p]);
-  table_.restrict_to(with_points, others);
-  blank_before_ = table_.size() - with_points.size() - others.size();
-  std::erase_if(patches_, [&](const Patch<Dim>& patch) { return table_.find(patch.id) < 0; });
-  connect_patches();
-}
-
-/// Looks at the work of all ranks since the last time, and deals the patches out anew where that evens it out.
-template <int Dim>
-void Simulation<Dim>::balance() {
-  const auto time = timers_.measure(Stage::migrate);
-  finish_speed_reduction();
-  forget_blank_patches();
-  if (ranks_ == 1 || parallel_.partition != Partition::metis) return;
-  std::vector<std::int64_t> work(table_.size(), 0);
-  for (auto& patch : patches_)
-    work[table_.find(patch.id)] = static_cast<std::int64_t>(patch.seconds * 1e9), patch.seconds = 0;
-  MPI_Allreduce(MPI_IN_PLACE, work.data(), static_cast<int>(work.size()), MPI_INT64_T, MPI_SUM, comm_);
-  const std::vector<int> before = table_.owners();
-  const double now = imbalance_of(work, before, ranks_);
-  if (now < parallel_.imbalance) return;
-  const double start = MPI_Wtime();
-  const auto parts = distribute_patches(lattice_, table_.patches(), work, ranks_, Partition::metis);
-  const auto owner = keep_in_place(parts, before, work, ranks_);
-  if (imbalance_of(work, owner, ranks_) > 0.95 * now) return;
-  move_patches(patches_, table_, owner, lattice_, comm_);
-  connect_patches();
-  ++times_balanced_;
-  seconds_balancing_ += MPI_Wtime() - start;
 }
 
 template class Simulation<2>;

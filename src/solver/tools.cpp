@@ -68,8 +68,7 @@ void Simulation<Dim>::begin_tools() {
     tool.next = tool.velocity.at(time_ + dt_) + tool.speed * tool.piston.along;
     tool.spin_next = tool.spin.at(time_ + dt_);
   }
-  for (Body& body : bodies_)
-    if (body.tool >= 0 && tools_[body.tool].moves()) body.change = tools_[body.tool].next - tools_[body.tool].now;
+  for (const int b : moved_bodies_) bodies_[b].change = tools_[bodies_[b].tool].next - tools_[bodies_[b].tool].now;
 }
 
 /// What bodies press in this step moves the pistons. Collective where there are some.
@@ -98,9 +97,48 @@ void Simulation<Dim>::end_tools() {
 
 template <int Dim>
 void Simulation<Dim>::set_velocities_of_tools() {
-  for (Body& body : bodies_)
-    if (body.tool >= 0 && tools_[body.tool].moves())
-      body.velocity = tools_[body.tool].now, body.angular_velocity = tools_[body.tool].spin_now;
+  for (const int b : moved_bodies_) {
+    const Tool& tool = tools_[bodies_[b].tool];
+    bodies_[b].velocity = tool.now, bodies_[b].angular_velocity = tool.spin_now;
+  }
+}
+
+/// The stress of a driven body turns with it: its nodes have the velocity of the rigid motion, whose gradient is its
+/// spin.
+template <int Dim>
+void Simulation<Dim>::turn_stress(Piece<Dim>& piece) {
+  const auto& material = material_of(piece);
+  if (material.rigid || !turns_rigidly(piece)) return;
+  velocities_.lend(piece.nodes.velocity);
+  velocity_from_sums(piece);
+  SpeedLimits unlimited;  // no wave runs through it
+  update_stress(piece, lattice_, transfer_, material.law, material.density, dt_, unlimited);
+  if (!std::isfinite(unlimited.wave)) speeds_.wave = unlimited.wave;
+}
+
+/// Points of a rigid body turn about its centre, which travels with its tool.
+template <int Dim>
+void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
+  using C = PointColumns<Dim>;
+  const Body& body = bodies_[piece.body];
+  const Tool& tool = tools_[body.tool];
+  Points<Dim>& points = piece.points;
+  const Vec3 spin = tool.spin_of_step(), way = dt_ * tool.of_step(), centre = body.centre + tool.travel;
+  const double speed = spin.norm();
+  const Vec3 axis = speed > 0 ? Vec3(spin / speed) : Vec3::UnitZ();
+  const Mat3 turn = Eigen::AngleAxisd(speed * dt_, axis).toRotationMatrix();
+  for (int p = 0; p < points.size(); ++p) {
+    Vec3 arm = Vec3::Zero();
+    for (int d = 0; d < Dim; ++d) arm[d] = points.column(d)[p] + points.images()[p][d] * lattice_.length(d) - centre[d];
+    const Vec3 turned = speed > 0 ? Vec3(turn * arm) : arm;
+    const Vec3 velocity = tool.next + tool.spin_next.cross(turned);
+    for (int d = 0; d < Dim; ++d) {
+      points.column(d)[p] += way[d] + turned[d] - arm[d];
+      points.column(C::velocity + d)[p] = velocity[d];
+    }
+    for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = tool.spin_next[Dim == 2 ? 2 : s];
+    speeds_.point = std::max(speeds_.point, velocity.norm());
+  }
 }
 
 /// Sums of this rank's patches; of the pistons alone, or of all tools.
@@ -140,6 +178,8 @@ void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
 #define CAIRN_INSTANTIATE(Dim)                                              \
   template std::vector<double> Simulation<Dim>::tool_states() const;        \
   template void Simulation<Dim>::restore_tools(const std::vector<double>&); \
+  template void Simulation<Dim>::turn_stress(Piece<Dim>&);                  \
+  template void Simulation<Dim>::move_rigid(Piece<Dim>&);                   \
   template void Simulation<Dim>::begin_tools();                             \
   template void Simulation<Dim>::push_pistons();                            \
   template void Simulation<Dim>::end_tools();                               \

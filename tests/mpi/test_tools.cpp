@@ -96,6 +96,28 @@ TEST(Tools, AreTheSameOnAnyNumberOfRanks) {
   EXPECT_EQ(alone, together);
 }
 
+/// What was of the last step is forgotten where a body has left a patch to itself.
+TEST(Tools, FeelNothingOnceABodyHasGone) {
+  Case c = soft_case(2, 48, 4);
+  add_body(c, Ball{Vec3(0.16, 0.5, 0), 0.12}, Vec3(-1, 0, 0));
+  for (auto& face : c.faces) face.type = FaceType::wall;
+  c.output.forces.every = 1;
+  Simulation<2> simulation(c, MPI_COMM_WORLD);
+  int rank = 0;
+  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  double pressed = 0, last = 0;
+  for (int i = 0; i < 500; ++i) {
+    simulation.step(forever);
+    if (i % 10 != 0) continue;
+    const std::vector<ToolSum> sums = simulation.tool_sums();
+    last = std::abs(sums[0].last[0]);
+    pressed = std::max(pressed, last);
+  }
+  if (rank != 0) return;
+  EXPECT_GT(pressed, 0);
+  EXPECT_EQ(last, 0);
+}
+
 /// A rigid box on its own follows its table exactly, and a piston that nothing touches falls under its force.
 TEST(Tools, MoveAsGiven) {
   Case c = soft_case(2, 24, 6);

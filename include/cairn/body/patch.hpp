@@ -88,6 +88,12 @@ struct Patch {
     return point_count() == 0 && contacts.empty() && tools.empty() && cracks.empty() && ledger == PatchLedger{};
   }
 
+  /// Takes back what was of the last step alone.
+  void forget_last_step() {
+    ledger.contact_nodes = 0;
+    for (auto& [tool, sum] : tools) sum.last = {};
+  }
+
   std::int64_t point_count() const {
     std::int64_t n = 0;
     for (const auto& piece : pieces) n += piece.points.size();

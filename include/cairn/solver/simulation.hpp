@@ -201,7 +201,7 @@ class Simulation {
   /// Nothing is or comes there: nothing to do.
   bool is_idle(std::size_t p) {
     if (!patches_[p].pieces.empty() || !exchange_->is_quiet(p)) return false;
-    patches_[p].ledger.contact_nodes = 0;
+    patches_[p].forget_last_step();
     return true;
   }
   /// Notes the processor time that a patch takes.
@@ -293,6 +293,7 @@ class Simulation {
   std::vector<SolverMaterial> materials_;
   std::vector<Body> bodies_;
   std::vector<Tool> tools_;
+  std::vector<int> moved_bodies_;  // of tools whose velocity changes
   bool has_pistons_ = false;
   std::vector<Patch<Dim>> patches_;
   PatchTable<Dim> table_;
