@@ -108,3 +108,31 @@ def fresh_folder(path: str) -> Path:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     return folder
+
+
+def expect(condition, message) -> None:
+    if not condition:
+        raise AssertionError(message)
+
+
+def expect_code(done: Done, code: int, *words: str) -> None:
+    """The exit code, and words that the report must hold."""
+    expect(done.code == code, f"exit code {done.code} instead of {code}\n{done.out}\n{done.err}")
+    for word in words:
+        expect(word in done.err, f"'{word}' is not in the report:\n{done.err}")
+
+
+def run_tests(names: dict, cairn: Program, scratch: Path) -> int:
+    """Calls every test_* of a module with the program and a folder of its own; the exit code."""
+    tests = {name: function for name, function in names.items() if name.startswith("test_")}
+    failures = []
+    for name, function in tests.items():
+        here = scratch / name
+        here.mkdir()
+        try:
+            function(cairn, here)
+        except AssertionError as failure:
+            failures.append(f"{name}: {failure}")
+    print("\n".join(failures))
+    print(f"{len(tests)} tests, {len(failures)} failed")
+    return 1 if failures else 0

@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from harness import PATIENCE, ROOT, Program, fresh_folder, sets
+from harness import PATIENCE, ROOT, Program, expect, expect_code, fresh_folder, sets
 
 DISKS = ROOT / "cases" / "two_disks.toml"
 SHEAR = ROOT / "cases" / "shear_small.toml"
@@ -27,18 +27,6 @@ ALL_OUTPUTS = {"output.particles": "{ every = 2 }", "output.grains": "{ every = 
                "output.contacts": "{ every = 2 }", "output.track": "[0]"}
 FAST = {"bodies.1.velocity": "[20.0, 0.0]", "output.history": "{ every = 1 }",
         "boundary.right": '{ type = "free", leaving = "stop" }'}  # ends at the right face
-
-
-def expect(condition, message):
-    if not condition:
-        raise AssertionError(message)
-
-
-def expect_code(done, code: int, *words):
-    """The exit code, and words that the report must hold."""
-    expect(done.code == code, f"exit code {done.code} instead of {code}\n{done.out}\n{done.err}")
-    for word in words:
-        expect(word in done.err, f"'{word}' is not in the report:\n{done.err}")
 
 
 def names(folder: Path) -> list[str]:

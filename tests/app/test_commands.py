@@ -13,18 +13,13 @@ import sys
 import tomllib
 from pathlib import Path
 
-from harness import ROOT, Program, fresh_folder, sets
+from harness import ROOT, Program, expect, fresh_folder, sets
 
 DISKS = ROOT / "cases" / "two_disks.toml"
 FEW = {"time.steps": 6, "output.history": "{ every = 1 }", "output.checkpoint": "{ every = 3 }",
        "output.particles": "{ every = 3 }"}
 
 FAILING = {"bodies.0.angular_velocity": 5.0, "solver.energy_limit": 1e-15}  # turning gives it some error
-
-
-def expect(condition, message):
-    if not condition:
-        raise AssertionError(message)
 
 
 def expect_code(done, code: int, *words):

@@ -7,7 +7,7 @@ import csv
 import sys
 from pathlib import Path
 
-from harness import Program, fresh_folder, load_compare_runs, sets
+from harness import Program, expect_code, fresh_folder, load_compare_runs, run_tests, sets
 
 MATERIAL = 'model = "neo_hookean"\ndensity = 1000.0\nyoungs_modulus = {modulus}\npoissons_ratio = 0.3\n'
 # Grains fall through an orifice between two fixed plates and out of the free bottom face.
@@ -62,12 +62,6 @@ def plain(path: Path, time: str, domain: str = "", body: str = "", modulus: floa
 def history(folder: Path) -> list[dict]:
     with open(folder / "history.csv", encoding="utf-8") as file:
         return [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-
-
-def expect_code(done, code: int, *words: str):
-    assert done.code == code, f"exit code {done.code} instead of {code}\n{done.out}\n{done.err}"
-    for word in words:
-        assert word in done.err, f"'{word}' is not in the report:\n{done.err}"
 
 
 def hopper(path: Path) -> Path:
@@ -169,19 +163,7 @@ def test_a_rigid_material_needs_no_density(cairn: Program, here: Path):
 
 
 def main() -> int:
-    cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
-    failures = []
-    tests = {name: function for name, function in globals().items() if name.startswith("test_")}
-    for name, function in tests.items():
-        here = scratch / name
-        here.mkdir()
-        try:
-            function(cairn, here)
-        except AssertionError as failure:
-            failures.append(f"{name}: {failure}")
-    print("\n".join(failures))
-    print(f"{len(tests)} tests, {len(failures)} failed")
-    return 1 if failures else 0
+    return run_tests(globals(), Program(sys.argv[1]), fresh_folder(sys.argv[2]))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import sys
 import time
 from pathlib import Path
 
-from harness import PATIENCE, ROOT, Program, fresh_folder, load_compare_runs, sets
+from harness import PATIENCE, ROOT, Program, expect, expect_code, fresh_folder, load_compare_runs, sets
 
 DISKS = ROOT / "cases" / "two_disks.toml"
 SHEAR = ROOT / "cases" / "shear_small.toml"
@@ -23,17 +23,6 @@ FEW = sets({"time.steps": 3})
 OUTPUTS = sets({"output.particles": "{ every = 2 }", "output.grains": "{ every = 2 }",
                 "output.contacts": "{ every = 2 }", "output.track": "[0]", "output.checkpoint": "{ every = 2 }"})
 LOCK = ".cairn.lock"
-
-
-def expect(condition, message):
-    if not condition:
-        raise AssertionError(message)
-
-
-def expect_code(done, code: int, *words):
-    expect(done.code == code, f"exit code {done.code} instead of {code}\n{done.out}\n{done.err}")
-    for word in words:
-        expect(word in done.err, f"'{word}' is not in the report:\n{done.err}")
 
 
 def contents(folder: Path) -> dict:

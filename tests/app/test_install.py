@@ -10,12 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from harness import ROOT, Program, fresh_folder, sets
-
-
-def expect(condition, message):
-    if not condition:
-        raise AssertionError(message)
+from harness import ROOT, Program, expect, fresh_folder, sets
 
 
 def bash(text: str, path: Path) -> str:

@@ -8,7 +8,7 @@ import math
 import sys
 from pathlib import Path
 
-from harness import ROOT, Program, fresh_folder, sets
+from harness import ROOT, Program, expect_code, fresh_folder, run_tests, sets
 
 COLUMNS = ("step,time,tool,name,x,y,z,vx,vy,vz,wx,wy,wz,fx,fy,fz,mx,my,mz,impulse_x,impulse_y,impulse_z,work")
 # A weight on an elastic column between rollers: a mass on a spring.
@@ -51,12 +51,6 @@ def rows_of(folder: Path, name: str) -> list[dict]:
     assert text.splitlines()[0] == COLUMNS, text[:200]
     return [{key: value if key == "name" else float(value) for key, value in row.items()}
             for row in csv.DictReader(text.splitlines()) if row["name"] == name]
-
-
-def expect_code(done, code: int, *words: str):
-    assert done.code == code, f"exit code {done.code} instead of {code}\n{done.out}\n{done.err}"
-    for word in words:
-        assert word in done.err, f"'{word}' is not in the report:\n{done.err}"
 
 
 def test_a_piston_on_a_column_swings(cairn: Program, here: Path):
@@ -129,19 +123,7 @@ def test_bad_tools_are_refused(cairn: Program, here: Path):
 
 
 def main() -> int:
-    cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
-    failures = []
-    tests = {name: function for name, function in globals().items() if name.startswith("test_")}
-    for name, function in tests.items():
-        here = scratch / name
-        here.mkdir()
-        try:
-            function(cairn, here)
-        except AssertionError as failure:
-            failures.append(f"{name}: {failure}")
-    print("\n".join(failures))
-    print(f"{len(tests)} tests, {len(failures)} failed")
-    return 1 if failures else 0
+    return run_tests(globals(), Program(sys.argv[1]), fresh_folder(sys.argv[2]))
 
 
 if __name__ == "__main__":
