@@ -16,7 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<Tool, 3> all_tools = {{{"plot", "Draw the pictures of a run"},
+constexpr std::array<Tool, 4> all_tools = {{{"plot", "Draw the pictures of a run"},
+                                            {"measure", "Measure a run's grains, contacts and stresses"},
                                             {"compare-runs", "Compare two folders of results bit for bit"},
                                             {"convert-grains", "Make a grain table of another program's output"}}};
 
