@@ -16,7 +16,8 @@ from measuring.snapshot import Snapshot, tensors
 from measuring.stress import branches
 from results import MissingData
 
-ALONG = 16  # places along a branch where its stress is put, midpoint rule
+ALONG = 8  # places within a radius along a branch where its stress is put, midpoint rule
+BLOCK = 1 << 21  # weights of the kernel that are held at a time
 
 
 @dataclasses.dataclass
@@ -59,29 +60,27 @@ def spread(grid: Grid, place: np.ndarray, values: np.ndarray) -> np.ndarray:
     near = (grid.periodic | (local > -1) & (local < cells + 1)).all(axis=1)
     local, values = local[near], values[near]
     local = np.where(grid.periodic, local % cells, np.clip(local, 0, cells * (1 - 1e-15)))
-    home = np.floor(local).astype(int)
     reach = np.ceil(grid.radius / grid.size).astype(int)
-    offsets = list(itertools.product(*(range(-r, r + 1) for r in reach)))
-    total = np.zeros(len(local))
+    offsets = np.array(list(itertools.product(*(range(-r, r + 1) for r in reach))))
+    field = np.zeros((values.shape[1], int(np.prod(cells))))
+    block = max(1, BLOCK // len(offsets))
+    for first in range(0, len(local), block):
+        rows = slice(first, first + block)
+        flat, weight = weights(grid, local[rows], offsets)
+        scaled = values[rows] / weight.sum(axis=1)[:, None]
+        for k, column in enumerate(scaled.T):
+            field[k] += np.bincount(flat.ravel(), (weight * column[:, None]).ravel(), field.shape[1])
+    return (field.T / grid.volume).reshape(*cells, values.shape[1])
 
-    def weights(offset):
-        cell = home + np.array(offset)
-        inside = np.where(grid.periodic, True, (cell >= 0) & (cell < cells)).all(axis=1)
-        distance = np.linalg.norm((cell + 0.5 - local) * grid.size, axis=1)
-        cell = np.where(grid.periodic, cell % cells, np.clip(cell, 0, cells - 1))
-        return np.where(inside, lucy(distance, grid.radius), 0.0), cell
 
-    for offset in offsets:
-        total += weights(offset)[0]
-    field = np.zeros((int(np.prod(cells)), values.shape[1]))
-    scaled = values / total[:, None]
-    for offset in offsets:
-        weight, cell = weights(offset)
-        some = weight > 0
-        flat = np.ravel_multi_index(tuple(cell[some].T), tuple(cells))
-        for k in range(values.shape[1]):
-            field[:, k] += np.bincount(flat, weight[some] * scaled[some, k], len(field))
-    return (field / grid.volume).reshape(*cells, values.shape[1])
+def weights(grid: Grid, local: np.ndarray, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The cells around each place, which is in units of cells, and the kernel there, 0 beyond a border."""
+    cell = np.floor(local).astype(int)[:, None, :] + offsets
+    distance = np.sqrt((((cell + 0.5 - local[:, None, :]) * grid.size) ** 2).sum(axis=2))
+    inside = (grid.periodic | (cell >= 0) & (cell < grid.cells)).all(axis=2)
+    cell = np.where(grid.periodic, cell % grid.cells, np.clip(cell, 0, grid.cells - 1))
+    flat = np.ravel_multi_index(tuple(np.moveaxis(cell, 2, 0)), tuple(grid.cells))
+    return flat, np.where(inside, lucy(distance, grid.radius), 0.0)
 
 
 @dataclasses.dataclass
@@ -141,10 +140,14 @@ def contact_field(snapshot: Snapshot, grid: Grid) -> np.ndarray | None:
         return None
     d = snapshot.dimension
     branch = branches(snapshot, grains, contacts)
-    share = (np.arange(ALONG) + 0.5) / ALONG
+    longest = np.linalg.norm(branch, axis=1).max(initial=0.0)
+    along = int(np.clip(np.ceil(ALONG * longest / grid.radius), 1, 64))
+    share = (np.arange(along) + 0.5) / along
     place = grains.centre[contacts.a][:, None, :] + share[None, :, None] * branch[:, None, :]
-    moment = (contacts.force[:, :, None] * branch[:, None, :]).reshape(-1, 1, d * d) / ALONG
-    moment = np.broadcast_to(moment, (len(contacts), ALONG, d * d))
+    moment = contacts.force[:, :, None] * branch[:, None, :]
+    moment += np.where(contacts.b < 0, 1.0, 0.0)[:, None, None] * contacts.moment  # that of a pair cancels
+    moment = moment.reshape(-1, 1, d * d) / along
+    moment = np.broadcast_to(moment, (len(contacts), along, d * d))
     return spread(grid, place.reshape(-1, d), moment.reshape(-1, d * d)).reshape(*grid.cells, d, d)
 
 

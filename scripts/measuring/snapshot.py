@@ -11,9 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
+from bodies import FACES
 from results import Frame, MissingData, Run
 
 VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # xx yy zz xy yz xz
+MOVES = {"velocity", "position", "piston", "servo"}  # keys with which a wall may stand elsewhere than its face
 SAME_TIME = 1e-9  # relative to the time of the last output
 
 
@@ -56,6 +58,7 @@ class Contacts:
     point: np.ndarray  # [m]
     normal: np.ndarray  # unit, out of a
     force: np.ndarray  # on a [N]
+    moment: np.ndarray  # sum over the contact's nodes of f_i (x_j - point_j), on a [N m]
 
     def __len__(self) -> int:
         return len(self.a)
@@ -135,12 +138,13 @@ class Snapshot:
         def row_of(body):
             return np.where((body >= 0) & (body < len(number_of)), number_of[np.clip(body, 0, len(number_of) - 1)], -1)
         a, b = row_of(first), row_of(second)
+        point, force, moment = frame.field("point")[:, :d], frame.field("force")[:, :d], np.zeros((len(a), d, d))
+        if frame.has("moment"):
+            moment = frame.field("moment").reshape(-1, 3, 3)[:, :d, :d] - force[:, :, None] * point[:, None, :]
         swap = (a < 0) & (b >= 0)  # the grain first
         sign = np.where(swap, -1.0, 1.0)[:, None]
-        force = sign * frame.field("force")[:, :d]
-        normal = sign * frame.field("normal")[:, :d]
-        found = Contacts(np.where(swap, b, a), np.where(swap, a, b), np.where(swap, first, second),
-                         frame.field("point")[:, :d], normal, force)
+        found = Contacts(np.where(swap, b, a), np.where(swap, a, b), np.where(swap, first, second), point,
+                         sign * frame.field("normal")[:, :d], sign * force, sign[:, :, None] * moment)
         found = found.chosen(found.a >= 0)
         size = np.linalg.norm(found.force, axis=1)
         return found.chosen(size > self.threshold * size.mean() if len(size) else np.zeros(0, bool))
@@ -171,8 +175,15 @@ class Snapshot:
 
     @cached_property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
-        """Between walls and tools: the domain, cut where a tool lies wholly on one side of all the grains' centres."""
+        """Between walls and tools: the domain, cut where a wall stands now, or where a tool lies wholly on one side of
+        all the grains' centres."""
         lower, upper = self.run.lower.copy(), self.run.upper.copy()
+        for face, condition in self.run.case.get("boundary", {}).items():
+            if isinstance(condition, dict) and MOVES.intersection(condition) and condition.get("type") == "wall":
+                axis, high = divmod(FACES.index(face), 2)
+                rows = self.run.forces().get(face)
+                if rows is not None:
+                    (upper if high else lower)[axis] = np.interp(self.time, rows["time"], rows["xyz"[axis]])
         low, high = self.tool_extents
         centres = self.grains.centre
         for axis in range(self.dimension):

@@ -24,18 +24,19 @@ def grain_moments(snapshot: Snapshot) -> np.ndarray:
     """Love and Weber, for each grain: sum over its contacts of f_i (x_j - centre_j) [J], N x d x d."""
     grains, contacts = snapshot.grains, snapshot.contacts
     arm = snapshot.shortest(contacts.point - grains.centre[contacts.a])
-    total = added(contacts.a, contacts.force[:, :, None] * arm[:, None, :], len(grains))
+    total = added(contacts.a, contacts.moment + contacts.force[:, :, None] * arm[:, None, :], len(grains))
     pair = contacts.b >= 0
     second = contacts.chosen(pair)
     arm = snapshot.shortest(second.point - grains.centre[second.b])
-    return total - added(second.b, second.force[:, :, None] * arm[:, None, :], len(grains))
+    return total - added(second.b, second.moment + second.force[:, :, None] * arm[:, None, :], len(grains))
 
 
 def contact_moment(snapshot: Snapshot) -> np.ndarray:
     """Of the cell: sum over contacts of f_i l_j [J], with the branch l from centre to centre, or from the centre to the
     contact with a tool or wall."""
     grains, contacts = snapshot.grains, snapshot.contacts
-    return np.einsum("ci,cj->ij", contacts.force, branches(snapshot, grains, contacts))
+    inner = contacts.moment[contacts.b < 0].sum(axis=0)  # that of a pair cancels
+    return np.einsum("ci,cj->ij", contacts.force, branches(snapshot, grains, contacts)) + inner
 
 
 def branches(snapshot: Snapshot, grains: Grains, contacts: Contacts) -> np.ndarray:
@@ -53,7 +54,7 @@ def boundary_moment(snapshot: Snapshot) -> np.ndarray:
     grains, contacts = snapshot.grains, snapshot.contacts
     outer = contacts.chosen(contacts.b < 0)
     middle = np.average(grains.centre, axis=0, weights=grains.mass)
-    total = np.einsum("ci,cj->ij", outer.force, outer.point - middle)
+    total = np.einsum("ci,cj->ij", outer.force, outer.point - middle) + outer.moment.sum(axis=0)
     if snapshot.walls_in_contacts:
         return total
     tools, (start, end) = snapshot.run.forces(), snapshot.contact_interval
@@ -87,6 +88,21 @@ def unbalance(snapshot: Snapshot) -> np.ndarray:
         total += sign * added(rows, chosen.force, len(grains))
         size += np.bincount(rows, np.linalg.norm(chosen.force, axis=1), len(grains))
     return np.linalg.norm(total, axis=1) / np.where(size > 0, size, 1.0)
+
+
+def motion_within(snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+    """Of each grain sum_p m v_i r_j and sum_p m v'_i v'_j [J s, J], v', r from the centre: by the first's change and the
+    second the mean stress differs from the contacts' (docs/measures.md)."""
+    frame, grains, d = snapshot.points, snapshot.grains, snapshot.dimension
+    row = np.full(int(max(frame.field("body").max(initial=0), grains.body.max())) + 1, -1)
+    row[grains.body] = np.arange(len(grains))
+    row = row[frame.field("body")]
+    keep = row >= 0
+    row, mass = row[keep], frame.field("mass")[keep][:, None, None]
+    v = frame.field("velocity")[keep][:, :d] - grains.velocity[row]
+    r = snapshot.shortest(frame.field("position")[keep][:, :d] - grains.centre[row])
+    return (added(row, mass * v[:, :, None] * r[:, None, :], len(grains)),
+            added(row, mass * v[:, :, None] * v[:, None, :], len(grains)))
 
 
 def cell_volume_stress(grains: Grains, volume: float) -> np.ndarray:

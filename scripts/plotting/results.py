@@ -21,7 +21,7 @@ from bodies import FACES, BodyTable, read_bodies
 COMPONENTS = {"position": 3, "velocity": 3, "spin": 3, "image": 3, "stress": 6, "stress_smooth": 6,
               "deformation_gradient": 9,
               "centre": 3, "angular_velocity": 3, "mean_stress": 6, "second_moment": 6,  # of bodies
-              "point": 3, "normal": 3, "force": 3}  # of contacts; other fields have one
+              "point": 3, "normal": 3, "force": 3, "moment": 9}  # of contacts; other fields have one
 
 
 class MissingData(Exception):

@@ -74,6 +74,13 @@ def padded(rows: np.ndarray) -> np.ndarray:
     return np.hstack([rows, np.zeros((len(rows), 3 - rows.shape[1]))])
 
 
+def moments(point, force, spread) -> np.ndarray:
+    whole = padded(force)[:, :, None] * padded(point)[:, None, :]
+    d = spread.shape[1]
+    whole[:, :d, :d] += spread
+    return whole.reshape(-1, 9)
+
+
 def voigt(tensors: np.ndarray) -> np.ndarray:
     whole = np.zeros((len(tensors), 3, 3))
     whole[:, : tensors.shape[1], : tensors.shape[1]] = tensors
@@ -96,10 +103,11 @@ def write_grains(folder: Path, number: int, time: float, centre: np.ndarray, rad
         "contact_count": np.zeros(count, int)})
 
 
-def write_contacts(folder: Path, number: int, time: float, a, b, point, normal, force) -> None:
+def write_contacts(folder: Path, number: int, time: float, a, b, point, normal, force, spread=None) -> None:
+    """`spread`: sum over the nodes of force (x) position, less that of the force at the point."""
     write_rows(folder / f"contacts_{number:06d}.h5", time, point, {
         "body_a": np.asarray(a), "body_b": np.asarray(b), "point": padded(point), "normal": padded(normal),
-        "force": padded(force)})
+        "force": padded(force)} | ({} if spread is None else {"moment": moments(point, force, spread)}))
 
 
 def start_run(folder: Path, upper, periodic, centre: np.ndarray, more: str = "") -> None:
@@ -208,7 +216,7 @@ def test_fabric_of_a_known_distribution(_cairn: Program, here: Path):
     push, drag = 1 + an * np.cos(2 * (theta - turn)), -at * np.sin(2 * (theta - turn))
     from measuring.snapshot import Contacts
     zero = np.zeros(count, int)
-    contacts = Contacts(zero, zero, zero, n, n, -push[:, None] * n - drag[:, None] * t)
+    contacts = Contacts(zero, zero, zero, n, n, -push[:, None] * n - drag[:, None] * t, np.zeros((count, 2, 2)))
     F = network.fabric(contacts)
     close(network.anisotropy(F), a, 1e-4), close(network.direction(F), 25.0, 1e-4)
     close(contacts.normal_force, push), close(np.linalg.norm(contacts.tangential_force, axis=1), np.abs(drag), 1e-9)
@@ -265,11 +273,12 @@ def random_run(folder: Path, d: int, periodic: bool, count: int = 60) -> Run:
     write_grains(folder, 1, 1.0, centre, random.uniform(0.02, 0.06, count), random.normal(size=(count, d)),
                  random.normal(size=(count, 3)), random.normal(size=(count, d, d)))
     a, b = np.arange(count - 1), np.arange(1, count)
-    a[::7] = -2 - (a[::7] % 3)  # walls
+    b[::7] = -1 - (a[::7] % 4)  # walls
     normal = random.normal(size=(count - 1, d))
     normal /= np.linalg.norm(normal, axis=1)[:, None]
-    point = np.clip(centre[b] + 0.05 * normal, 0, upper)
-    write_contacts(folder, 1, 1.0, a, b, point, normal, random.normal(size=(count - 1, d)))
+    point = np.clip(centre[a] + 0.05 * normal, 0, upper)
+    write_contacts(folder, 1, 1.0, a, b, point, normal, random.normal(size=(count - 1, d)),
+                   random.normal(size=(count - 1, d, d)))
     return Run(folder)
 
 
@@ -409,6 +418,116 @@ def test_rotations(_cairn: Program, here: Path):
         close(motion.rotations(run, Snapshot(run, 1)), vectors, 1e-7)
 
 
+STILL = """
+[domain]
+upper = [0.45, 0.45]
+cells = [36, 36]
+gravity = [0.0, -9.81]
+[time]
+end = 0.8
+[contact]
+friction = 0.3
+[materials.rubber]
+model = "viscoelastic"
+density = 1000.0
+shear_modulus = 2.0e4
+bulk_modulus = 8.0e4
+branch_moduli = [4.0e4]
+branch_times = [0.02]
+[materials.steel]
+model = "rigid"
+[[grains]]
+file = "still.csv"
+material = "rubber"
+[[bodies]]
+shape = { type = "box", lower = [0.055, 0.375], upper = [0.395, 0.425] }
+material = "steel"
+[[bodies]]
+shape = { type = "box", lower = [0.0, 0.0], upper = [0.45, 0.05] }
+material = "steel"
+[[bodies]]
+shape = { type = "box", lower = [0.0, 0.05], upper = [0.05, 0.45] }
+material = "steel"
+[[bodies]]
+shape = { type = "box", lower = [0.4, 0.05], upper = [0.45, 0.45] }
+material = "steel"
+[[drive]]
+ids = [0]
+velocity = [[0.0, 0.0, 0.0], [0.05, 0.0, -0.2], [0.2, 0.0, -0.2], [0.25, 0.0, 0.0]]
+[output]
+forces = { every = 50 }
+grains = { interval = 0.4 }
+contacts = { interval = 0.4 }
+particles = { interval = 0.4 }
+"""
+PLACES = ((0.107, 0.1065), (0.225, 0.1065), (0.343, 0.1065), (0.166, 0.203), (0.284, 0.203), (0.107, 0.3), (0.225, 0.3),
+          (0.343, 0.3))
+
+
+def test_stress_of_contacts_is_that_of_the_volume(cairn: Program, here: Path):
+    """Eight disks pressed by a lid, at rest: Love and Weber's stress is the mean over the points, of each and of all;
+    the columns of the grain file are sums over the points."""
+    (here / "still.csv").write_text("x,y,r\n" + "".join(f"{x},{y},0.056\n" for x, y in PLACES))
+    (here / "still.toml").write_text(STILL)
+    expect_code(cairn("run", here / "still.toml", "--out", here / "out", timeout=400), 0)
+    snapshot = Snapshot(Run(here / "out"), -1)
+    grains, points = snapshot.grains, snapshot.points
+    expect(len(grains) == 8 and (grains.body >= 4).all(), f"grains {grains.body}")
+    size = np.linalg.norm(grains.stress, axis=(1, 2))
+    errors = np.abs(stress.grain_moments(snapshot) / grains.volume[:, None, None] - grains.stress).max(axis=(1, 2)) / size
+    expect(errors.max() < 0.01, f"grains: {errors}")
+    box = snapshot.box
+    close(np.concatenate(box), np.array([0.05, 0.05, 0.4, 0.335]), 1e-3, "the box")
+    volume = float(np.prod(box[1] - box[0]))
+    of_volume = stress.cell_volume_stress(grains, volume)
+    for of_contacts in (stress.cell_contact_stress(snapshot, volume), stress.boundary_moment(snapshot) / volume):
+        error = np.abs(of_contacts - of_volume).max() / np.linalg.norm(of_volume)
+        expect(error < (1e-3 if snapshot.same_time(snapshot.run.contacts, "contacts").has("moment") else 2e-3), f"cell: {error}")
+    expect(stress.unbalance(snapshot).max() < 1e-3, f"unbalance {stress.unbalance(snapshot)}")
+    body, mass, V = points.field("body"), points.field("mass"), points.field("volume")
+    for k, number in enumerate(grains.body):
+        mine = body == number
+        close(grains.volume[k], V[mine].sum(), 1e-10)
+        r = points.field("position")[mine][:, :2] - grains.centre[k]
+        second = np.einsum("p,pi,pj->ij", mass[mine], r, r) + np.eye(2) * (mass[mine] * V[mine] / 12).sum()
+        close(grains.second_moment[k], second / mass[mine].sum(), 1e-10)
+    found, _ = collect.measures(snapshot, collect.Options())
+    close(found["packing_fraction"], grains.volume.sum() / volume)
+    expect(0.8 < found["least_aspect"] < 0.99 and 0.97 < found["least_circularity"] < 1.001, found)
+    expect(found["rattlers"] == 0 and found["granular_temperature"] < 1e-5, found)
+
+
+def test_stress_in_motion(cairn: Program, here: Path):
+    """Two disks collide: what contact and volume differ by is the inertia and the motion within, within 1 %."""
+    case = ROOT / "cases" / "two_disks.toml"
+    every = "{ every = 1 }"
+    found = cairn("run", case, "--out", here / "first", *sets({"output.particles": "{}", "output.checkpoint": "{}",
+                                                               "output.grains": "{ every = 10 }"}), timeout=300)
+    expect_code(found, 0)
+    run = Run(here / "first")
+    pressed = [np.abs(Snapshot(run, k).grains.stress).max() for k in range(len(run.grains))]
+    peak = run.grains[int(np.argmax(pressed))].step
+    settings = {"time.steps": peak + 20, "output.particles": every, "output.grains": every, "output.contacts": every,
+                "output.checkpoint": "{}"}
+    expect_code(cairn("run", case, "--out", here / "second", *sets(settings), timeout=300), 0)
+    run = Run(here / "second")
+    snapshots = [Snapshot(run, k) for k in range(peak - 60, len(run.grains))]
+    of_volume, of_contacts, flux = (np.mean(rows, axis=0) for rows in (
+        [s.grains.volume[:, None, None] * s.grains.stress for s in snapshots],
+        [stress.grain_moments(s) for s in snapshots[1:]], [stress.motion_within(s)[1] for s in snapshots]))
+    change = stress.motion_within(snapshots[-1])[0] - stress.motion_within(snapshots[0])[0]
+    whole = of_contacts - change / (snapshots[-1].time - snapshots[0].time) + flux
+
+    def symmetric(tensor):
+        return (tensor + np.swapaxes(tensor, 1, 2)) / 2
+
+    size = np.linalg.norm(of_volume, axis=(1, 2))
+    bare = np.abs(symmetric(of_contacts) - of_volume).max(axis=(1, 2)) / size
+    error = np.abs(symmetric(whole) - of_volume).max(axis=(1, 2)) / size
+    expect(error.max() < 0.01, f"{error}, of the contacts alone {bare}")
+    expect(bare.max() > 2 * error.max(), f"inertia plays no part: {bare}, {error}")
+
+
 def measure(*arguments) -> subprocess.CompletedProcess:
     return subprocess.run([ROOT / "scripts" / "measure", *map(str, arguments)], capture_output=True, text=True,
                           timeout=300 * PATIENCE, check=False)
@@ -443,7 +562,8 @@ def test_many_grains(_cairn: Program, here: Path):
     found, _ = collect.measures(snapshot, collect.Options())
     close(found["packing_fraction"], math.pi / 4, 1e-9), expect(found["coordination"] == 4, found)
     for name, table in collect.TABLES.items():
-        expect(len(table(snapshot, collect.Options(radius=8 * R))) > 2, name)
+        if name != "fields":  # the profile needs them
+            expect(len(table(snapshot, collect.Options(radius=8 * R))) > 2, name)
 
 
 def main() -> int:
