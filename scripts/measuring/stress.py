@@ -58,6 +58,8 @@ def boundary_moment(snapshot: Snapshot) -> np.ndarray:
     if snapshot.walls_in_contacts:
         return total
     tools, (start, end) = snapshot.run.forces(), snapshot.contact_interval
+    if not end > start:
+        raise MissingData("no forces were averaged before the first step")
     for face in snapshot.walls:
         if face not in tools:
             raise MissingData(f"forces.csv has no rows of the face {face}")
