@@ -105,7 +105,7 @@ def fields(snapshot: Snapshot, grid: Grid, by_points: bool = False) -> Fields:
         place, mass, velocity, volume, stress = of_points(snapshot)
     else:
         grains = snapshot.grains
-        place, mass, velocity, volume = grains.centre, grains.mass, grains.velocity, grains.volume
+        place, mass, velocity, volume = snapshot.wrapped(grains.centre), grains.mass, grains.velocity, grains.volume
         stress = None
     flux = mass[:, None, None] * velocity[:, :, None] * velocity[:, None, :]
     columns = [mass[:, None], mass[:, None] * velocity, flux.reshape(-1, d * d), volume[:, None]]
@@ -148,7 +148,7 @@ def contact_field(snapshot: Snapshot, grid: Grid) -> np.ndarray | None:
     moment += np.where(contacts.b < 0, 1.0, 0.0)[:, None, None] * contacts.moment  # that of a pair cancels
     moment = moment.reshape(-1, 1, d * d) / along
     moment = np.broadcast_to(moment, (len(contacts), along, d * d))
-    return spread(grid, place.reshape(-1, d), moment.reshape(-1, d * d)).reshape(*grid.cells, d, d)
+    return spread(grid, snapshot.wrapped(place.reshape(-1, d)), moment.reshape(-1, d * d)).reshape(*grid.cells, d, d)
 
 
 def grid_of(snapshot: Snapshot, box: tuple[np.ndarray, np.ndarray], radius: float | None = None,

@@ -50,7 +50,7 @@ def packing(snapshot: Snapshot, options: Options) -> Measures:
              "mean_diameter": float(grains.diameter.mean())}
     for name, corner in zip(("lower", "upper"), box):
         found |= {f"box_{name}_{a}": float(x) for a, x in zip(axes, corner)}
-    return found | {"packing_fraction": motion.packing_fraction(grains, box)}
+    return found | {"packing_fraction": motion.packing_fraction(snapshot, box)}
 
 
 def has_friction(run: Run) -> bool:
@@ -239,7 +239,7 @@ def pair_table(snapshot: Snapshot, options: Options) -> Table:
     whole = np.isclose(box[0], snapshot.run.lower) & np.isclose(box[1], snapshot.run.upper)
     periodic = snapshot.run.periodic & whole
     reach = min(5 * diameter, *np.where(periodic, size / 2, size / 3))
-    r, g = pair_correlation(grains.centre, box, periodic, reach, options.bins)
+    r, g = pair_correlation(snapshot.wrapped(grains.centre), box, periodic, reach, options.bins)
     return {"r": r, "r_over_diameter": r / diameter, "g": g}
 
 

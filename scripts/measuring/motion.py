@@ -54,10 +54,11 @@ def inertial_number(rate: float, pressure: float, grains: Grains) -> float:
     return rate * float(grains.diameter.mean()) * math.sqrt(density / pressure)
 
 
-def packing_fraction(grains: Grains, box: tuple[np.ndarray, np.ndarray]) -> float:
+def packing_fraction(snapshot: Snapshot, box: tuple[np.ndarray, np.ndarray]) -> float:
     """sum V_g / V. Grains whose centre lies outside the box are left out."""
-    inside = ((grains.centre >= box[0]) & (grains.centre <= box[1])).all(axis=1)
-    return float(grains.volume[inside].sum() / np.prod(box[1] - box[0]))
+    place = snapshot.wrapped(snapshot.grains.centre)
+    inside = ((place >= box[0]) & (place <= box[1])).all(axis=1)
+    return float(snapshot.grains.volume[inside].sum() / np.prod(box[1] - box[0]))
 
 
 @dataclasses.dataclass

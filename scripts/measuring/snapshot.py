@@ -122,6 +122,11 @@ class Snapshot:
                       column("velocity")[:, :d], column("angular_velocity"), column("volume"),
                       tensors(column("mean_stress"), d), tensors(column("second_moment"), d))
 
+    def wrapped(self, place: np.ndarray) -> np.ndarray:
+        """Places brought back into the domain across periodic faces [m]."""
+        length = np.where(self.period > 0, self.period, 1.0)
+        return place - np.where(self.period > 0, np.floor((place - self.run.lower) / length) * length, 0.0)
+
     def shortest(self, way: np.ndarray) -> np.ndarray:
         """A vector between two places, or the one to the nearest periodic image."""
         length = np.where(self.period > 0, self.period, 1.0)

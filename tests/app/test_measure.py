@@ -125,7 +125,7 @@ def lattice(folder: Path, steps: np.ndarray, cell: np.ndarray, basis: np.ndarray
     places = np.stack(np.meshgrid(*[np.arange(count)] * d, indexing="ij"), -1).reshape(-1, d)
     centre, upper = (places[:, None, :] * cell + basis).reshape(-1, d), count * cell
     start_run(folder, upper, [True] * d, centre)
-    write_grains(folder, 0, 1.0, centre)
+    write_grains(folder, 0, 1.0, centre + upper * (np.arange(len(centre)) % 3 - 1)[:, None])  # some have gone round
 
     def key(place: np.ndarray) -> np.ndarray:
         sixteenths = np.rint((place % upper) / R * 16).astype(int) % np.rint(upper / R * 16).astype(int)

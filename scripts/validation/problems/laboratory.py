@@ -11,7 +11,6 @@ from __future__ import annotations
 import functools
 from pathlib import Path
 
-import h5py
 import numpy as np
 
 from measuring import motion
@@ -28,13 +27,14 @@ CELLS = (12, 24)  # to a radius
 RATIOS = {0.3: 0.005, 0.495: 0.01}  # Poisson's, and the plate's speed, below 0.5 % of the waves'
 STRAINS = (0.05, 0.1, 0.2, 0.3, 0.4)
 BAND = 0.03
-ELEMENTS, STEPS = 24, 40
+ELEMENTS, STEPS = 32, 40
 # The layer: speeds of the upper wall [m/s], and what the case fixes.
 SPEEDS = (0.2, 0.4, 0.8)
 LENGTH, PRESSURE, DIAMETER, DENSITY = 0.8, 500.0, 0.1, 1000.0
 SETTLED = 0.75  # of the way that is sheared before anything is averaged, in wall-to-wall distances
 # The column of 44 disks.
-COLUMN_WIDTH, STRAY = 0.5, 1.2  # [m]; a disk farther than so many diameters from the next one has left the heap
+COLUMN_WIDTH, OPENED = 0.5, 0.25  # [m], and when the gate goes [s]
+STRAY = 1.2  # a disk farther than so many diameters from the next one has left the heap
 
 
 def flat(cells: int, poisson: float) -> Run:
@@ -49,9 +49,9 @@ def flat(cells: int, poisson: float) -> Run:
 
 
 def sheared(speed: float) -> Run:
-    end = 0.2 + 1.6 / speed  # to a shear of about two
+    end = 0.75 + 1.6 / speed  # to a shear of about two
     return Run("laboratory/plane_shear", NO_PARTICLES | {
-        "drive.0.velocity": [[0.0, 0.0, 0.0], [0.2, speed, 0.0]], "time.end": end, "output.contacts": "{}",
+        "drive.0.velocity": [[0.5, 0.0, 0.0], [1.0, speed, 0.0]], "time.end": end, "output.contacts": "{}",
         "output.grains.interval": end / 40}, 12 / speed)
 
 
@@ -150,30 +150,25 @@ def layer_checks(folders: Folders) -> list[Check]:
     return found
 
 
-def front(folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times, and how far the heap reaches: the farthest disk that hangs together with the left wall."""
-    times, reach = [], []
-    for path in sorted(folder.glob("grains_*.h5")):
-        with h5py.File(path) as file:
-            keep = file["material"][()] == file["material"][0]
-            centre, radius = file["centre"][()][keep][:, :2], np.sqrt(file["volume"][()][keep] / np.pi)
-            times.append(float(np.ravel(file.attrs["time"])[0]))
+def front(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, how far the heap reaches, that is the farthest disk that hangs together with the left wall, and how high."""
+    run, rows = Results(folder), []
+    for k, frame in enumerate(run.grains):
+        grains = Snapshot(run, k).grains
+        centre, radius = grains.centre, grains.diameter / 2
         heap = centre[:, 0] < 2 * DIAMETER
-        distance = np.linalg.norm(centre[:, None] - centre[None], axis=2)
-        close = distance < STRAY * (radius[:, None] + radius[None])
+        close = np.linalg.norm(centre[:, None] - centre[None], axis=2) < STRAY * (radius[:, None] + radius[None])
         while (grown := close[heap].any(axis=0) | heap).sum() > heap.sum():
             heap = grown
-        reach.append((centre[:, 0] + radius)[heap].max())
-    return np.array(times), np.array(reach)
+        rows.append((frame.time, (centre[:, 0] + radius)[heap].max(), (centre[:, 1] + radius)[heap].max()))
+    return tuple(np.array(rows).T)
 
 
 def column_checks(folders: Folders) -> list[Check]:
     if "column" not in folders:
         return []
-    times, reach = front(folders["column"])
-    with h5py.File(folders["column"] / "grains_000005.h5") as file:  # 0.25 s: before the gate goes
-        keep = file["material"][()] == file["material"][0]
-        height = float((file["centre"][()][keep][:, 1] + np.sqrt(file["volume"][()][keep] / np.pi)).max())
+    times, reach, heights = front(folders["column"])
+    height = float(np.interp(OPENED, times, heights))
     ratio = height / COLUMN_WIDTH
     literature = 2.5 * ratio if ratio < 2 else 3.25 * ratio**0.7
     return [record("column", "height over width a", ratio),
@@ -204,7 +199,7 @@ def draw(folders: Folders, out: Path) -> list[Path]:
             Curve("da Cruz et al. 2005", number, 0.25 + 1.1 * number, "k--"),
             Curve("here", np.array([m["I"] for m in layers]), np.array([m["mu"] for m in layers]), "o")]))
     if "column" in folders:
-        times, reach = front(folders["column"])
+        times, reach, _ = front(folders["column"])
         panels.append(Panel("Column collapse", "time [s]", "reach of the heap [m]", [Curve("here", times, reach)]))
     return [draw_panels(out / "laboratory.png", "The granular laboratory", panels, columns=2)]
 
