@@ -16,6 +16,7 @@ from results import Frame, MissingData, Run
 
 VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # xx yy zz xy yz xz
 MOVES = {"velocity", "position", "piston", "servo"}  # keys with which a wall may stand elsewhere than its face
+MOST = 0.95  # of the centres, on whose far side a tool bounds the box
 SAME_TIME = 1e-9  # relative to the time of the last output
 
 
@@ -181,7 +182,7 @@ class Snapshot:
     @cached_property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Between walls and tools: the domain, cut where a wall stands now, or where a tool lies wholly on one side of
-        all the grains' centres."""
+        nearly all the grains' centres."""
         lower, upper = self.run.lower.copy(), self.run.upper.copy()
         for face, condition in self.run.case.get("boundary", {}).items():
             if isinstance(condition, dict) and MOVES.intersection(condition) and condition.get("type") == "wall":
@@ -194,7 +195,7 @@ class Snapshot:
         for axis in range(self.dimension):
             if self.period[axis]:
                 continue
-            least, most = centres[:, axis].min(), centres[:, axis].max()
+            least, most = np.quantile(centres[:, axis], (1 - MOST, MOST))
             below, above = high[:, axis] <= least, low[:, axis] >= most
             lower[axis] = max(high[below, axis].max(initial=-np.inf), lower[axis])
             upper[axis] = min(low[above, axis].min(initial=np.inf), upper[axis])

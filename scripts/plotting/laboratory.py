@@ -178,12 +178,11 @@ def profiles(run: Run, other: Run | None, folder: Path, summary: dict) -> list[s
     shear = run.shear()
     across = shear.axis if shear else int(np.abs(run.gravity).argmax()) if np.abs(run.gravity).any() else 1
     late = [k for k, frame in enumerate(run.grains) if frame.time >= LATE * run.grains[-1].time]
-    tables = []
-    for k in late:
-        snapshot = Snapshot(run, k)
-        # Slices stay where they are while tools move.
-        grid = coarse.grid_of(snapshot, (run.lower, run.upper))
-        tables.append(coarse.profile(coarse.fields(snapshot, grid), across))
+    snapshots = [Snapshot(run, k) for k in late]
+    # Slices stay where they are while tools move: within the least box that holds those of all outputs.
+    box = np.min([s.box[0] for s in snapshots], axis=0), np.max([s.box[1] for s in snapshots], axis=0)
+    grid = coarse.grid_of(snapshots[0], box)
+    tables = [coarse.profile(coarse.fields(s, grid), across) for s in snapshots]
     names = [name for name in tables[-1] if all(name in table for table in tables)]
     mean = {}
     for name in names:
@@ -206,10 +205,23 @@ def profiles(run: Run, other: Run | None, folder: Path, summary: dict) -> list[s
     return saved(figure, folder, "profiles.png")
 
 
+def outflow(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
+    """What has left through free faces over time."""
+    history = run.history()
+    if not history.get("mass_left", np.zeros(1))[-1] > 0:
+        raise MissingData("nothing left the domain")
+    figure, axes = plt.subplots(figsize=(6.5, 4.5))
+    axes.plot(history["time"], history["mass_left"], lw=1.2)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("mass that left [kg]" + (" per metre" if run.dimension == 2 else ""))
+    axes.set_title(run.title, fontsize=10)
+    return saved(figure, folder, "outflow.png")
+
+
 def at_end(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
     """No picture: all measures of the last output go to summary.json."""
     summary["measures_at_end"] = collect.measures(Snapshot(run, len(run.grains) - 1), collect.Options())[0]
     return []
 
 
-FIGURES = (force_displacement, stress_strain, coordination, force_distribution, fabric_rose, profiles, at_end)
+FIGURES = (force_displacement, stress_strain, coordination, force_distribution, fabric_rose, profiles, outflow, at_end)
