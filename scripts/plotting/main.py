@@ -10,6 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from cracks import cracks, tips
 from figures import FIGURES
 from results import Damaged, Frame, MissingData, Run
 
@@ -23,6 +24,8 @@ PICTURES = """pictures:
   stress_strain.png, coordination.png, force_distribution.png, fabric_rose.png, profiles.png
                             measures of grains and contacts (docs/measures.md)
   outflow.png               mass that left through free faces
+  cracks.png                faces of cracks over the bodies (2D)
+  tips.png                  J, K and growth of their tips (output.tips)
   film.mp4 or film.gif      with --film
   photoelastic.png          with --fringes PA: dark fringes of equal shear stress (2D), and nothing else is drawn
 A picture whose data the run does not hold is skipped with a note."""
@@ -82,7 +85,7 @@ def pictures(options: argparse.Namespace) -> int:
     run = Run(options.run)
     other = Run(options.compare) if options.compare else None
     run.raw_stress = options.raw_stress
-    figures = list(FIGURES)
+    figures = [*FIGURES, cracks, tips]
     if options.film:
         from film import film
 
