@@ -25,6 +25,19 @@ struct RowState {
   Vec<Dim> momentum = Vec<Dim>::Zero();
 };
 
+/// Mass times the velocity that strains see in the step: at its start, at its end, or their mean.
+template <int Dim>
+Vec<Dim> strain_momentum(const NodeBox<Dim>& nodes, int row, double mass, StressUpdate update) {
+  using Map = Eigen::Map<const Vec<Dim>>;
+  const auto at = static_cast<std::size_t>(row);
+  const Map start(nodes.sums.data() + at * NodeSums<Dim>::width + NodeSums<Dim>::momentum);
+  const double* motion = nodes.motion.data() + at * NodeMotion<Dim>::width + NodeMotion<Dim>::velocity;
+  const double* end = update == StressUpdate::last ? motion : nodes.velocity.data() + at * vector_width;
+  if (update == StressUpdate::first) return start;
+  if (update == StressUpdate::both) return 0.5 * (start + mass * Map(end));
+  return mass * Map(end);
+}
+
 /// The row of a piece that the crack cuts; -1: none.
 template <int Dim>
 int row_at(const CrackSurroundings<Dim>& around, int crack, const Piece<Dim>& piece, const Index<Dim>& place,
@@ -47,10 +60,7 @@ RowState<Dim> state_of(const CrackSurroundings<Dim>& around, int crack, const In
     const double density = around.densities[piece.body];
     const double mass = nodes.sums[static_cast<std::size_t>(row) * NodeSums<Dim>::width];
     state.mass += mass, state.fill += mass / (density * around.lattice.cell_volume());
-    if (nodes.motion.empty()) continue;
-    using M = NodeMotion<Dim>;
-    state.momentum +=
-        mass * Eigen::Map<const Vec<Dim>>(nodes.motion.data() + static_cast<std::size_t>(row) * M::width + M::velocity);
+    if (!nodes.motion.empty()) state.momentum += strain_momentum(nodes, row, mass, around.update);
   }
   return state;
 }

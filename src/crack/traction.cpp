@@ -81,7 +81,7 @@ double TractionLaw::stored(const Modes& d, const Bond& bond) const {
 double TractionLaw::dissipated_unbroken(const Bond& bond) const {
   double sum = 0;
   for (int m = 0; m < 2; ++m)
-    sum += area_of(modes_[m], bond.peak[m]) - 0.5 * traction_of(modes_[m], bond.peak[m]) * bond.peak[m];
+    sum += std::max(0.0, area_of(modes_[m], bond.peak[m]) - 0.5 * traction_of(modes_[m], bond.peak[m]) * bond.peak[m]);
   return sum;
 }
 

@@ -82,7 +82,9 @@ TEST(Growth, SteadyGrowthHasItsSpeedAndEnd) {
   while (simulation.time() < 0.4) {
     simulation.step(1e300);
     const double due = 0.8 * (simulation.time() - 0.05), grown = simulation.cracks()[0].grown[1];
-    if (due < 0) EXPECT_EQ(grown, 0);
+    if (due < 0) {
+      EXPECT_EQ(grown, 0);
+    }
     if (due > 0.05 && due < 0.18) slowest = std::min(slowest, grown - due), fastest = std::max(fastest, grown - due);
   }
   EXPECT_LE(fastest, 0.001);

@@ -34,7 +34,7 @@ TEST(Tractions, AnInterfaceGivesByItsStiffness) {
     Case c = column(static_cast<int>(L), shear ? 0 : 1e-4, shear ? 1e-4 : 0, CrackLaw::interface);
     c.cracks[0].interface.opening = c.cracks[0].interface.sliding = D;
     Simulation<2> simulation(c, MPI_COMM_SELF);
-    while (simulation.time() < 60 * L / std::sqrt(M / 1000)) simulation.step(1e300);
+    while (simulation.time() < 50 * L / std::sqrt(M / 1000)) simulation.step(1e300);
     double stress = 0, volume = 0;
     for (const auto& [id, p] : points_of(simulation)) stress += p.mass * p.stress.c[shear ? 3 : 1], volume += p.mass;
     stress /= volume;
@@ -75,17 +75,17 @@ TEST(Tractions, AWaveThroughAnInterface) {
 TEST(Tractions, HalvesPulledApartTakeTheEnergyOfTheLaw) {
   for (const bool shear : {false, true})
     for (const auto shape : {CohesiveShape::triangle, CohesiveShape::linear, CohesiveShape::exponential}) {
-      const double M = shear ? 4e3 : soft_bulk + 4.0 / 3 * 4e3, L = 10, speed = 2e-3;
+      const double M = shear ? 4e3 : soft_bulk + 4.0 / 3 * 4e3, L = 10, speed = 4e-4;
       Case c = column(static_cast<int>(L), shear ? 0 : speed, shear ? speed : 0, CrackLaw::cohesive);
       CohesiveSpec& law = c.cracks[0].cohesive;
-      law.shape = shape, law.strength = {0.004 * M, 0.004 * M};
-      law.energy = {0.004 * M * 0.1, 0.004 * M * 0.1};  // critical opening .2 cells
+      law.shape = shape, law.strength = {0.01 * M, 0.01 * M};
+      law.energy = {0.01 * M * 0.1, 0.01 * M * 0.1};  // critical opening .2 cells
       law.peak = 0.3;
       c.solver.noise_filter = NoiseFilter::off;
       Simulation<2> simulation(c, MPI_COMM_SELF);
       double peak = 0, before = 0, worst = 0;
       const double critical = shape == CohesiveShape::exponential ? 0.3 : 0.2;
-      while (speed * simulation.time() < 2.5 * critical) {
+      while (speed * simulation.time() < 2 * critical) {
         simulation.step(1e300);
         double stress = 0, volume = 0;
         for (const auto& [id, p] : points_of(simulation)) {
@@ -94,7 +94,7 @@ TEST(Tractions, HalvesPulledApartTakeTheEnergyOfTheLaw) {
         }
         peak = std::max(peak, stress / volume);
         const Totals t = simulation.totals();
-        EXPECT_GE(t.crack_dissipation, before);
+        EXPECT_GE(t.crack_dissipation, before * (1 - 1e-12));
         before = t.crack_dissipation;
         worst = std::max(worst, std::abs(t.energy()));
       }

@@ -1,6 +1,7 @@
 #pragma once
 /// How cracks move with the material: their faces see the rows on their side.
 
+#include "cairn/core/options.hpp"
 #include "cairn/crack/sides.hpp"
 
 namespace cairn {
@@ -28,6 +29,7 @@ struct CrackSurroundings {
   const CrackSegments<Dim>& segments;
   const std::vector<Crack>& cracks;
   const std::vector<double>& densities;  // of bodies; 0 for rigid ones, which no crack cuts [kg/m3]
+  StressUpdate update = StressUpdate::both;
 };
 
 /// \param side  1 above, -1 below
@@ -46,8 +48,9 @@ struct FaceMotion {
   Vec<Dim> velocity;   // [m/s]
 };
 
-/// Gives the patch's own crack points the velocities of their faces, from NodeMotion's velocity, which moves the
-/// material as well. Of wide cracks a face may lie with a neighbour: returns what this patch knows of faces of others'
+/// Gives the patch's own crack points the velocities of their faces, from those that strains see in the step: forces do
+/// their work by them. With those that move the material instead, nodes' accelerations that no point sees would move the
+/// faces against their tractions, and make energy. Of wide cracks a face may lie with a neighbour: returns what this patch knows of faces of others'
 /// points.
 template <int Dim>
 std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,

@@ -282,7 +282,7 @@ class Simulation {
   void add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip>& tips, std::vector<TipSums>& sums) const;
   CrackSegments<Dim>& segments_of(const Patch<Dim>& patch) { return segments_[&patch - patches_.data()]; }
   CrackSurroundings<Dim> surroundings_of(const Patch<Dim>& patch) {
-    return {patch, lattice_, segments_of(patch), cracks_, crack_densities_};
+    return {patch, lattice_, segments_of(patch), cracks_, crack_densities_, solver_.stress_update};
   }
   void finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share);
   void turn_stress(Piece<Dim>& piece);
