@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from command import folder_in, run_command
+from cracks import cracks, tips
 from figures import FIGURES, values
 from look import Look
 from results import Frame, MissingData, Run
@@ -28,6 +29,8 @@ PICTURES = """pictures:
   stress_strain.png, coordination.png, force_distribution.png, fabric_rose.png, profiles.png
                             measures of grains and contacts (docs/measures.md)
   outflow.png               mass that left through free faces
+  cracks.png                faces of cracks over the bodies (2D)
+  tips.png                  J, K and growth of their tips (output.tips)
   film.mp4 or film.gif      with --film
   photoelastic.png          with --fringes PA: dark fringes of equal shear stress (2D), and nothing else is drawn
 A picture whose data the run does not hold is skipped with a note."""
@@ -109,7 +112,7 @@ def pictures(options: argparse.Namespace) -> int:
     run.look = look_of(options, run)
     if other:
         other.look = run.look
-    figures = list(FIGURES)
+    figures = [*FIGURES, cracks, tips]
     if options.colour != "body" or options.times:
         figures.append(values)
     if options.film:

@@ -104,19 +104,24 @@ void ContactSweep<Dim>::add_crack_pairs(const Node& node, const Patch<Dim>& patc
   for (int far = 0; far < node.count; ++far)
     for (int n = 0; n < entry[far].sides.size(); ++n) {
       const int crack = entry[far].sides.crack(n);
-      if (!settings.cracks[crack].meets) continue;
+      const CrackContact& contact = settings.cracks[crack];
+      const bool tied = contact.tie != CrackContact::Tie::none;
+      if (!contact.meets && !tied) continue;
       const double* there = crossing(entry[far], crack, patch);
       for (int near = 0; near < node.count; ++near) {
         if (entry[near].piece != entry[far].piece || !(entry[near].sides == entry[far].sides.without(crack))) continue;
         const bool far_is_above = there[NodeCrossings<Dim>::sign] > 0;
         NodePair<Dim> pair;
         pair.a = far_is_above ? near : far, pair.b = far_is_above ? far : near;
-        pair.crack = crack, pair.law = settings.cracks[crack].law;
+        pair.crack = crack, pair.law = contact.law;
         pair.normal = crack_normal(node, crack, patch);
         const double mass = entry[far].mass + entry[near].mass;
         pair.open = pair.law.binds() || (pair.normal.squaredNorm() > 0 &&
                                          std::min(entry[far].mass, entry[near].mass) >= least_share_across * mass);
         pair.gap = contact::crack_gap<Dim>(patch, lattice, crack, x, pair.normal);
+        if (contact.meets) pairs_.push_back(pair);
+        if (!tied || !(pair.normal.squaredNorm() > 0)) continue;
+        pair.tie = contact.tie, pair.law.law = ContactLaw::stick, pair.open = true;
         pairs_.push_back(pair);
       }
     }

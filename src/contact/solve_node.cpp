@@ -98,7 +98,7 @@ void ContactSweep<Dim>::solve_pair(const Node& node, NodePair<Dim>& pair, Pass p
   if (!pair.open) return;
   const Vec<Dim> P = reduced_mass(node, pair) * relative_velocity(node, pair);
   if (pair.law.binds())
-    pair.impulse = -P;
+    for (const Vec<Dim>& along : bound_directions(pair)) pair.impulse -= P.dot(along) * along;
   else if (pass == Pass::second)
     pair.impulse = contact::reaction_impulse<Dim>(P, pair.normal, pair.decision, pair.law.friction);
   else
@@ -125,6 +125,20 @@ void ContactSweep<Dim>::solve_together(const Node& node, Pass pass) {
   add_friction(node);
 }
 
+/// Directions that span what a pair binds: all, or those of a tie across a crack.
+template <int Dim>
+std::vector<Vec<Dim>> ContactSweep<Dim>::bound_directions(const NodePair<Dim>& pair) const {
+  using Tie = CrackContact::Tie;
+  if (pair.tie == Tie::normal) return {pair.normal};
+  std::vector<Vec<Dim>> directions;
+  if (pair.tie == Tie::none) {
+    for (int d = 0; d < Dim; ++d) directions.push_back(Vec<Dim>::Unit(d));
+  } else if constexpr (Dim == 2) {
+    directions.push_back(Vec<2>(-pair.normal.y(), pair.normal.x()));
+  }
+  return directions;
+}
+
 /// The impulses that bring what holds to rest with the least change of kinetic energy. With rows c = n . (v_a - v_b),
 /// of all components where it sticks, and K = J M^-1 J^T, they are -K^-1 c along the rows.
 template <int Dim>
@@ -136,7 +150,7 @@ void ContactSweep<Dim>::bring_to_rest(const Node& node) {
     pairs[p].impulse.setZero();
     if (modes_[p] == Mode::slide) rows_.push_back({p, pairs[p].normal});
     if (modes_[p] == Mode::stick || modes_[p] == Mode::bound)
-      for (int d = 0; d < Dim; ++d) rows_.push_back({p, Vec<Dim>::Unit(d)});
+      for (const Vec<Dim>& along : bound_directions(pairs[p])) rows_.push_back({p, along});
   }
   const int n = static_cast<int>(rows_.size());
   if (n == 0) return;

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <optional>
+#include <tuple>
 
 namespace cairn {
 namespace {
@@ -24,22 +25,42 @@ struct RowState {
   Vec<Dim> momentum = Vec<Dim>::Zero();
 };
 
+/// Mass times the velocity that strains see in the step: at its start, at its end, or their mean.
+template <int Dim>
+Vec<Dim> strain_momentum(const NodeBox<Dim>& nodes, int row, double mass, StressUpdate update) {
+  using Map = Eigen::Map<const Vec<Dim>>;
+  const auto at = static_cast<std::size_t>(row);
+  const Map start(nodes.sums.data() + at * NodeSums<Dim>::width + NodeSums<Dim>::momentum);
+  const double* motion = nodes.motion.data() + at * NodeMotion<Dim>::width + NodeMotion<Dim>::velocity;
+  const double* end = update == StressUpdate::last ? motion : nodes.velocity.data() + at * vector_width;
+  if (update == StressUpdate::first) return start;
+  if (update == StressUpdate::both) return 0.5 * (start + mass * Map(end));
+  return mass * Map(end);
+}
+
+/// The row of a piece that the crack cuts; -1: none.
+template <int Dim>
+int row_at(const CrackSurroundings<Dim>& around, int crack, const Piece<Dim>& piece, const Index<Dim>& place,
+           SideSet sides) {
+  const NodeBox<Dim>& nodes = piece.nodes;
+  if (!(around.densities[piece.body] > 0) || !around.cracks[crack].cuts(piece.body) || !nodes.box.contains(place))
+    return -1;
+  if (sides.empty()) return nodes.box.offset(place);
+  const int further = nodes.further.find(place, sides);
+  return further < 0 ? -1 : nodes.row_of(further);
+}
+
 template <int Dim>
 RowState<Dim> state_of(const CrackSurroundings<Dim>& around, int crack, const Index<Dim>& place, SideSet sides) {
   RowState<Dim> state;
   for (const auto& piece : around.patch.pieces) {
     const NodeBox<Dim>& nodes = piece.nodes;
+    const int row = row_at<Dim>(around, crack, piece, place, sides);
+    if (row < 0) continue;
     const double density = around.densities[piece.body];
-    if (!(density > 0) || !around.cracks[crack].cuts(piece.body) || !nodes.box.contains(place)) continue;
-    const int further = sides.empty() ? -1 : nodes.further.find(place, sides);
-    if (!sides.empty() && further < 0) continue;
-    const int row = sides.empty() ? nodes.box.offset(place) : nodes.row_of(further);
     const double mass = nodes.sums[static_cast<std::size_t>(row) * NodeSums<Dim>::width];
     state.mass += mass, state.fill += mass / (density * around.lattice.cell_volume());
-    if (nodes.motion.empty()) continue;
-    using M = NodeMotion<Dim>;
-    state.momentum +=
-        mass * Eigen::Map<const Vec<Dim>>(nodes.motion.data() + static_cast<std::size_t>(row) * M::width + M::velocity);
+    if (!nodes.motion.empty()) state.momentum += strain_momentum(nodes, row, mass, around.update);
   }
   return state;
 }
@@ -100,25 +121,29 @@ Vec<Dim> velocity_of(const CrackSurroundings<Dim>& around, int crack, const Face
   return v;
 }
 
+/// Calls f(state) for all rows at a node.
+template <int Dim, class F>
+void for_rows(const CrackSurroundings<Dim>& around, int crack, const Index<Dim>& place, F&& f) {
+  f(state_of<Dim>(around, crack, place, {}));
+  std::vector<SideSet> seen;
+  for (const auto& piece : around.patch.pieces) {
+    const auto [first, last] = piece.nodes.further.at(place);
+    for (int k = first; k < last; ++k) seen.push_back(piece.nodes.further.rows[k].sides);
+  }
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  for (const SideSet sides : seen) f(state_of<Dim>(around, crack, place, sides));
+}
+
 /// The common velocity of all that moves around x; nothing where nothing does.
 template <int Dim>
 std::optional<Vec<Dim>> common_velocity(const CrackSurroundings<Dim>& around, int crack, const Vec<Dim>& x) {
   double mass = 0;
   Vec<Dim> momentum = Vec<Dim>::Zero();
   for_nearest(around.lattice, x, [&](const Index<Dim>& place, const Vec<Dim>&, double weight) {
-    const auto add = [&](SideSet sides) {
-      const auto state = state_of<Dim>(around, crack, place, sides);
+    for_rows<Dim>(around, crack, place, [&](const RowState<Dim>& state) {
       mass += weight * state.mass, momentum += weight * state.momentum;
-    };
-    add({});
-    std::vector<SideSet> seen;
-    for (const auto& piece : around.patch.pieces) {
-      const auto [first, last] = piece.nodes.further.at(place);
-      for (int k = first; k < last; ++k) seen.push_back(piece.nodes.further.rows[k].sides);
-    }
-    std::sort(seen.begin(), seen.end());
-    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-    for (const SideSet sides : seen) add(sides);
+    });
   });
   if (!(mass > 0)) return {};
   return Vec<Dim>(momentum / mass);
@@ -161,6 +186,17 @@ FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoin
   return face;
 }
 
+template <int Dim>
+double fill_at(const CrackSurroundings<Dim>& around, int crack, const Vec<Dim>& x) {
+  double fill = 0;
+  for_nearest(around.lattice, x, [&](const Index<Dim>& place, const Vec<Dim>&, double weight) {
+    double there = 0;
+    for_rows<Dim>(around, crack, place, [&](const RowState<Dim>& state) { there += state.fill; });
+    fill += weight * std::min(1.0, there);
+  });
+  return fill;
+}
+
 namespace {
 
 /// Whether x lies so near to a patch's cells that it has all nodes around it.
@@ -188,15 +224,28 @@ Box<Dim> cells_of_owner(const CrackSurroundings<Dim>& around, const CrackPoint<D
   return {};
 }
 
+/// Whether a face lies among the patch's nodes, and not among those of the patch that the crack point belongs to.
+template <int Dim>
+bool answers_for_face(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, int side) {
+  const Vec<Dim>& x = point.face(side);
+  if (!is_among_nodes(around.lattice, around.patch.cells, x)) return false;
+  if (point.own) return true;
+  const Box<Dim> owner = cells_of_owner(around, point);
+  return !owner.empty() && !is_among_nodes(around.lattice, owner, x);
+}
+
 /// Velocities of the two faces, where they are known: {below, above}.
 template <int Dim>
 using Faces = std::array<std::optional<Vec<Dim>>, 2>;
 
 template <int Dim>
-Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point) {
+Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, CrackPoint<Dim>& point) {
   const Crack& crack = around.cracks[point.crack];
   Faces<Dim> faces;
-  if ((point.index == crack.ends[0] && !crack.open[0]) || (point.index == crack.ends[1] && !crack.open[1])) {
+  point.faces_filled = 0;
+  if (crack.idle) faces[0] = faces[1] = Vec<Dim>::Zero();
+  if (crack.idle) return faces;
+  if (crack.is_tip(point.index)) {
     faces[0] = faces[1] = common_velocity(around, point.crack, point.plane);
     return faces;
   }
@@ -208,7 +257,9 @@ Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, const Crack
       continue;
     }
     const auto rows = rows_of_face(around, point, side);
-    if (rows.is_filled()) velocity = velocity_of(around, point.crack, rows);
+    if (!rows.is_filled()) continue;
+    velocity = velocity_of(around, point.crack, rows);
+    point.faces_filled |= CrackPoint<Dim>::filled_bit(side);
   }
   if (!faces[1]) faces[1] = faces[0];
   if (!faces[0]) faces[0] = faces[1];
@@ -220,20 +271,16 @@ Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, const Crack
 template <int Dim>
 std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,
                                                   const CrackSurroundings<Dim>& around) {
-  const Lattice<Dim>& lattice = around.lattice;
   std::vector<Faces<Dim>> known(points.size());
   std::vector<FaceMotion<Dim>> told;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const CrackPoint<Dim>& point = points[k];
+    CrackPoint<Dim>& point = points[k];
     if (point.own) {
       known[k] = velocities_of_faces(around, point);
       continue;
     }
     for (const int side : {-1, 1}) {
-      const Vec<Dim>& x = point.face(side);
-      if (!is_among_nodes(lattice, around.patch.cells, x)) continue;
-      const Box<Dim> owner = cells_of_owner(around, point);
-      if (owner.empty() || is_among_nodes(lattice, owner, x)) continue;
+      if (!answers_for_face(around, point, side)) continue;
       const auto rows = rows_of_face(around, point, side);
       if (rows.is_filled()) told.push_back({static_cast<int>(k), side, velocity_of(around, point.crack, rows)});
     }
@@ -269,10 +316,58 @@ void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
   }
 }
 
+template <int Dim>
+std::vector<RowForce<Dim>> find_row_forces(const CrackSurroundings<Dim>& around) {
+  std::vector<RowForce<Dim>> forces;
+  for (const auto& point : around.patch.cracks) {
+    const bool carries = point.bond.state == Bond::holds && point.bond.length > 0 && point.faces_filled == 3;
+    if (!carries || around.cracks[point.crack].is_tip(point.index)) continue;
+    for (const int side : {-1, 1}) {
+      if (!answers_for_face(around, point, side)) continue;
+      const Vec<Dim> force = -side * point.bond.length * point.traction;
+      for (const auto& at : rows_of_face(around, point, side).rows)
+        forces.push_back({around.patch.id, point.crack, point.index, side, at.place, at.sides, at.weight * force});
+    }
+  }
+  return forces;
+}
+
+template <int Dim>
+void sort_row_forces(std::vector<RowForce<Dim>>& forces) {
+  const auto face = [](const RowForce<Dim>& f) { return std::tuple(f.crack, f.index, f.side); };
+  const auto order = [&](const RowForce<Dim>& f) {
+    return std::tuple(f.crack, f.index, f.side, f.from, FurtherRow<Dim>{f.place, f.sides});
+  };
+  std::ranges::sort(forces, {}, order);
+  std::vector<RowForce<Dim>> first;
+  for (const auto& f : forces)
+    if (first.empty() || face(first.back()) != face(f) || first.back().from == f.from) first.push_back(f);
+  forces = std::move(first);
+}
+
+template <int Dim>
+void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, const std::vector<RowForce<Dim>>& forces) {
+  for (const auto& f : forces) {
+    const double whole = state_of<Dim>(around, f.crack, f.place, f.sides).mass;
+    for (auto& piece : patch.pieces) {
+      const int row = row_at<Dim>(around, f.crack, piece, f.place, f.sides);
+      if (row < 0) continue;
+      const double mass = piece.nodes.sums[static_cast<std::size_t>(row) * NodeSums<Dim>::width];
+      if (mass > 0)
+        Eigen::Map<Vec<Dim>>(piece.nodes.force.data() + static_cast<std::size_t>(row) * vector_width) +=
+            mass / whole * f.force;
+    }
+  }
+}
+
 #define CAIRN_INSTANTIATE(Dim)                                                                     \
   template FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>&, const CrackPoint<Dim>&, int); \
   template std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>&,        \
                                                              const CrackSurroundings<Dim>&);       \
+  template double fill_at(const CrackSurroundings<Dim>&, int, const Vec<Dim>&);                     \
+  template std::vector<RowForce<Dim>> find_row_forces(const CrackSurroundings<Dim>&);              \
+  template void sort_row_forces(std::vector<RowForce<Dim>>&);                                      \
+  template void add_row_forces(Patch<Dim>&, const CrackSurroundings<Dim>&, const std::vector<RowForce<Dim>>&); \
   template void borrow_face_velocities(std::vector<CrackPoint<Dim>>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -71,4 +71,27 @@ TipSums tip_terms(const CrackTip& tip, const TipPoint& point, double inner, doub
   return sums;
 }
 
+TipSums face_terms(const CrackTip& tip, const Vec<2>& x, const Vec<2>& force, double width, double inner, double outer) {
+  TipSums sums;
+  const Vec<2> away = x - tip.position, normal(-tip.ahead.y(), tip.ahead.x());
+  const double behind = -away.dot(tip.ahead);
+  const double from = std::max(0.0, behind - 0.5 * width), to = behind + 0.5 * width;
+  if (!(to > 0) || tip.modulus == 0 || std::abs(away.dot(normal)) > outer) return sums;
+  const double q = weight_at(Vec<2>(behind, 0), inner, outer).q;
+  // The mean of 1/sqrt(2 pi r) over the width.
+  const double unit = q * 4 / tip.modulus * 2 * (std::sqrt(to) - std::sqrt(from)) / (width * std::sqrt(2 * M_PI));
+  sums.I_opening = unit * force.dot(normal), sums.I_sliding = unit * force.dot(tip.ahead);
+  return sums;
+}
+
+HoopStress largest_hoop_stress(double K_opening, double K_sliding) {
+  double angle = 0;
+  if (K_sliding != 0) {
+    const double ratio = K_opening / K_sliding;
+    angle = 2 * std::atan((ratio - std::copysign(std::sqrt(ratio * ratio + 8), K_sliding)) / 4);
+  }
+  const double c = std::cos(angle / 2);
+  return {angle, c * (K_opening * c * c - 1.5 * K_sliding * std::sin(angle))};
+}
+
 }  // namespace cairn

@@ -48,6 +48,7 @@ CrackSegments<Dim>::CrackSegments(const Patch<Dim>& patch, const Lattice<Dim>& l
     const auto& points = patch.cracks;
     for (std::size_t k = 0; k < points.size(); ++k) {
       const Crack& crack = cracks[points[k].crack];
+      if (crack.idle) continue;
       const bool joined = k + 1 < points.size() && points[k].precedes(points[k + 1]);
       const bool follows = k > 0 && points[k - 1].precedes(points[k]);
       const Vec<2>& x = points[k].plane;
@@ -56,10 +57,10 @@ CrackSegments<Dim>::CrackSegments(const Patch<Dim>& patch, const Lattice<Dim>& l
         const double cells = step.cwiseProduct(lattice.inverse_spacing()).norm();
         return x + step * std::min(4.0, longest_open_end / std::max(cells, 1e-300));
       };
-      if (joined && points[k].index == crack.ends[0] && crack.open[0])
+      if (joined && points[k].index == crack.ends[0] && crack.open[0] && !crack.joined[0])
         add(points[k].crack, beyond(points[k + 1].plane), x);
       if (joined) add(points[k].crack, x, points[k + 1].plane);
-      if (follows && points[k].index == crack.ends[1] && crack.open[1])
+      if (follows && points[k].index == crack.ends[1] && crack.open[1] && !crack.joined[1])
         add(points[k].crack, x, beyond(points[k - 1].plane));
     }
   }
@@ -121,6 +122,19 @@ auto CrackSegments<Dim>::crossed(std::span<const int> near, const Vec<Dim>& x, c
       Eigen::Map<Vec<2>>(at + NodeCrossings<2>::normal) = normal.normalized();
     }
   return found;
+}
+
+template <int Dim>
+double CrackSegments<Dim>::first_meeting(const Vec<Dim>& x, const Vec<Dim>& y, int crack, double skipped) const {
+  double first = std::numeric_limits<double>::infinity();
+  if constexpr (Dim == 2)
+    for (const Segment& s : segments_) {
+      const bool beside_tip = s.crack == crack && std::min((s.a - x).norm(), (s.b - x).norm()) < skipped;
+      if (beside_tip || crack::crossing(x, y, s.a, s.b) == 0) continue;
+      const double away = (x - s.a).dot(s.normal), beyond = (y - s.a).dot(s.normal);
+      first = std::min(first, away / (away - beyond));
+    }
+  return first;
 }
 
 template <int Dim>

@@ -13,8 +13,7 @@ namespace {
 /// Whether x lies in a body that the crack may cut.
 bool in_cut_body(const Case& c, const CrackSpec& crack, const Vec3& x) {
   return std::ranges::any_of(c.bodies, [&](const BodySpec& body) {
-    const bool cut = crack.groups.empty() || std::ranges::find(crack.groups, body.group) != crack.groups.end();
-    return cut && contains(body.shape, x);
+    return crack.cuts(static_cast<int>(&body - c.bodies.data()), body.group) && contains(body.shape, x);
   });
 }
 
@@ -56,13 +55,14 @@ void read_crack(Table table, Draft& draft) {
   CrackSpec crack;
   crack.source = table.where().text();
   const std::size_t before = table.error_count();
-  if (!table.has("points")) table.missing("points", "is missing; list the points of the crack's line");
+  const bool in_grains = table.has("grains");
+  if (!table.has("points") && !in_grains)
+    table.missing("points", "is missing; list the points of the crack's line, or give `grains`");
+  for (const auto* key : {"points", "ends", "ids"})
+    if (in_grains && table.has(key)) table.error(key, "is found for each grain where `grains` is given; remove it");
   if (table.has("points")) crack.points = table.vectors("points", 2);
-  crack.law = table.choice("law", crack_law_names, crack.law);
-  if (table.has("friction") && crack.law != CrackLaw::friction)
-    table.error("friction", "is only for cracks with law = \"friction\"");
-  crack.friction = table.number("friction", crack.friction, friction_range);
   if (table.has("bodies")) crack.groups = table.texts("bodies");
+  if (table.has("ids")) crack.ids = table.integers("ids"), check_ids(table, "ids", crack.ids, draft);
   for (const auto& group : crack.groups)
     if (draft.bodies_known && std::ranges::none_of(c.bodies, [&](const auto& b) { return b.group == group; }))
       table.error("bodies", fmt::format("no body has the group {}", in_quotes(group)));
@@ -77,11 +77,32 @@ void read_crack(Table table, Draft& draft) {
         crack.ends[i] = found->value;
     }
   }
+  if (in_grains) {
+    crack.ends = {CrackEnd::tip, CrackEnd::tip};  // some of them
+    read_crack_law(table, crack);
+    if (table.error_count() == before) read_grain_cracks(table.table("grains"), crack, draft);
+    return table.finish();
+  }
+  read_crack_law(table, crack);
   table.finish();
   if (table.error_count() == before && draft.domain_known) check_points_of(table, c.domain, crack);
   if (table.error_count() == before && draft.bodies_known)
     for (const int end : {0, 1}) check_end(table, c, crack, end);
   c.cracks.push_back(std::move(crack));
+}
+
+/// Directions of growth come from stress intensities, which only some laws have.
+void check_hoop_materials(Table& table, const Case& c, const CrackSpec& crack) {
+  if (crack.growth.direction != GrowthDirection::hoop || crack.growth.criterion == GrowthCriterion::none) return;
+  for (int b = 0; b < std::ssize(c.bodies); ++b) {
+    const Material& material = c.materials[c.bodies[b].material];
+    if (!crack.cuts(b, c.bodies[b].group) || is_prescribed(c, b)) continue;
+    if (material.model == "hypoelastic" || material.model == "neo_hookean") continue;
+    return table.error("", fmt::format("{}: growth by hoop stress needs stress intensities, which the model {} of body {} "
+                                       "has not; use hypoelastic or neo_hookean, or criterion = \"energy\" with "
+                                       "direction = \"straight\"",
+                                       crack.source, in_quotes(material.model), b));
+  }
 }
 
 }  // namespace
@@ -97,6 +118,8 @@ void read_cracks(Table& root, Draft& draft) {
     read_crack(std::move(table), draft);
   }
   Table settings = root.table("crack");
+  if (draft.bodies_known && root.error_count() == 0)
+    for (const CrackSpec& crack : c.cracks) check_hoop_materials(root, c, crack);
   if (settings.present() && c.cracks.empty()) settings.error("", "is given without [[cracks]]; remove it");
   if (settings.has("j_radius")) {
     const auto radii = settings.numbers("j_radius", not_negative);
@@ -105,6 +128,7 @@ void read_cracks(Table& root, Draft& draft) {
     else
       c.crack.j_radius = {radii[0], radii[1]};
   }
+  c.crack.split = static_cast<int>(settings.integer("split", 0, 0, 1000000));
   settings.finish();
   if (c.cracks.empty()) return;
   Table contact = root.table("contact");
@@ -115,6 +139,11 @@ void read_cracks(Table& root, Draft& draft) {
     contact.error("normal_choice", "must be \"common\" where there are cracks");
   if (c.contact.law == ContactLaw::none)
     contact.error("law", "must not be \"none\" where there are cracks, which cut fields of bodies; use \"stick\"");
+  const auto pulls = [](const CrackSpec& crack) { return crack.has_tractions(); };
+  if (std::ranges::any_of(c.cracks, pulls) && c.solver.stress_update != StressUpdate::both &&
+      c.solver.stress_update != StressUpdate::first)
+    root.table("solver").error("stress_update",
+                               "must be \"both\" or \"first\" where cracks have interfaces or cohesive laws");
   if (c.contact.separation > 0) contact.error("separation", "must be 0 where there are cracks");
 }
 

@@ -36,7 +36,16 @@ inline constexpr Named<LostPoints> lost_points_names[] = {{"stop", LostPoints::s
 inline constexpr Named<CrackLaw> crack_law_names[] = {{"stick", CrackLaw::stick},
                                                       {"friction", CrackLaw::friction},
                                                       {"frictionless", CrackLaw::frictionless},
-                                                      {"free", CrackLaw::free}};
+                                                      {"free", CrackLaw::free},
+                                                      {"interface", CrackLaw::interface},
+                                                      {"cohesive", CrackLaw::cohesive}};
+inline constexpr Named<CohesiveShape> cohesive_shape_names[] = {{"triangle", CohesiveShape::triangle},
+                                                                {"linear", CohesiveShape::linear},
+                                                                {"exponential", CohesiveShape::exponential}};
+inline constexpr Named<GrowthCriterion> growth_criterion_names[] = {
+    {"hoop", GrowthCriterion::hoop}, {"energy", GrowthCriterion::energy}, {"steady", GrowthCriterion::steady}};
+inline constexpr Named<GrowthDirection> growth_direction_names[] = {{"straight", GrowthDirection::straight},
+                                                                    {"hoop", GrowthDirection::hoop}};
 inline constexpr Named<CrackEnd> crack_end_names[] = {{"open", CrackEnd::open}, {"tip", CrackEnd::tip}};
 inline constexpr Named<Surface> surface_names[] = {{"whole", Surface::whole}, {"cut", Surface::cut}};
 inline constexpr Named<NoiseFilter> noise_filter_names[] = {{"off", NoiseFilter::off},

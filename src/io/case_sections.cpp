@@ -274,12 +274,16 @@ void read_output(Table output, const Draft& draft, Output& result) {
   const std::pair<std::string_view, Schedule*> plain[] = {{"grains", &result.grains},
                                                           {"contacts", &result.contacts},
                                                           {"forces", &result.forces},
+                                                          {"tips", &result.tips},
                                                           {"history", &result.history}};
   for (const auto& [key, schedule] : plain) {
     Table table = output.table(key);
     read_schedule(table, *schedule);
     table.finish();
   }
+  const auto has_tip = [](const CrackSpec& c) { return c.ends[0] == CrackEnd::tip || c.ends[1] == CrackEnd::tip; };
+  if (result.tips.active() && std::ranges::none_of(draft.result.cracks, has_tip) && output.error_count() == 0)
+    output.error("tips", "is for tips of cracks, and no crack has one");
   result.track = output.integers("track");
   check_ids(output, "track", result.track, draft);
   output.finish();

@@ -39,6 +39,10 @@ void read_grains(Table& root, Draft& draft, Errors& errors);
 void read_drives(Table& root, Draft& draft);
 /// [[cracks]] and [crack]; after bodies and contact.
 void read_cracks(Table& root, Draft& draft);
+/// Appends the cracks of an entry that lays one in many bodies.
+void read_grain_cracks(Table table, const CrackSpec& crack, Draft& draft);
+/// The keys of one of them for its faces and its growth; after its ends.
+void read_crack_law(Table& table, CrackSpec& crack);
 
 /// Appends the balls of a grain table; returns the checksum of its bytes.
 std::uint64_t read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors);

@@ -237,6 +237,39 @@ void write_bodies(Writer& out, const Draft& draft) {
   }
 }
 
+std::string text_or_perfect(double stiffness) { return text_of(std::isfinite(stiffness) ? stiffness : -1.0); }
+
+void write_growth(Writer& out, const GrowthSpec& growth) {
+  std::string text = fmt::format("{{ criterion = \"{}\"", name_of(growth_criterion_names, growth.criterion));
+  if (growth.criterion == GrowthCriterion::hoop) text += ", toughness = " + text_of(growth.toughness);
+  if (growth.criterion != GrowthCriterion::hoop) text += ", energy = " + text_of(growth.energy);
+  if (growth.criterion == GrowthCriterion::steady)
+    text += fmt::format(", speed = {}, start = {}", text_of(growth.speed), text_of(growth.start));
+  text += fmt::format(", direction = \"{}\", most = {}, length = {}, every = {}, cohesive = {} }}",
+                      name_of(growth_direction_names, growth.direction), text_of(growth.most), text_of(growth.length),
+                      growth.every, growth.cohesive);
+  out.raw("growth", text);
+}
+
+void write_crack_law(Writer& out, const CrackSpec& crack) {
+  if (crack.law == CrackLaw::friction || crack.law == CrackLaw::cohesive) out.key("friction", crack.friction);
+  if (crack.law == CrackLaw::interface) {
+    out.raw("normal_stiffness", text_or_perfect(crack.interface.opening));
+    out.raw("closing_stiffness", text_or_perfect(crack.interface.closing));
+    out.raw("tangential_stiffness", text_or_perfect(crack.interface.sliding));
+  }
+  if (crack.law == CrackLaw::cohesive || crack.growth.cohesive) {
+    const CohesiveSpec& law = crack.cohesive;
+    std::string text = fmt::format("{{ shape = \"{}\", strength = {}, energy = {}",
+                                   name_of(cohesive_shape_names, law.shape), list_of(law.strength, 2),
+                                   list_of(law.energy, 2));
+    if (law.shape == CohesiveShape::triangle) text += ", peak = " + text_of(law.peak);
+    if (law.exponent > 0) text += ", exponent = " + text_of(law.exponent);
+    out.raw("cohesive", text + fmt::format(", from = {}, to = {} }}", text_of(law.range[0]), text_of(law.range[1])));
+  }
+  if (crack.growth.criterion != GrowthCriterion::none) write_growth(out, crack.growth);
+}
+
 void write_cracks(Writer& out, const Case& c) {
   for (const auto& crack : c.cracks) {
     out.section("[[cracks]]");
@@ -246,12 +279,14 @@ void write_cracks(Writer& out, const Case& c) {
     out.raw("ends", fmt::format("[\"{}\", \"{}\"]", name_of(crack_end_names, crack.ends[0]),
                                 name_of(crack_end_names, crack.ends[1])));
     out.key("law", name_of(crack_law_names, crack.law));
-    if (crack.law == CrackLaw::friction) out.key("friction", crack.friction);
+    write_crack_law(out, crack);
     if (!crack.groups.empty()) out.raw("bodies", list_of(crack.groups, std::ssize(crack.groups)));
+    if (!crack.ids.empty()) out.raw("ids", list_of(crack.ids, std::ssize(crack.ids)));
   }
   if (c.cracks.empty()) return;
   out.section("[crack]");
   out.raw("j_radius", list_of(c.crack.j_radius, 2));
+  out.key("split", c.crack.split);
 }
 
 void write_boundary(Writer& out, const Case& c) {
@@ -291,6 +326,7 @@ void write_output(Writer& out, const Output& o) {
   write_schedule(out, "grains", o.grains);
   write_schedule(out, "contacts", o.contacts);
   write_schedule(out, "forces", o.forces);
+  write_schedule(out, "tips", o.tips);
   write_schedule(out, "history", o.history);
   write_schedule(out, "checkpoint", o.checkpoint, "keep = " + text_of(o.checkpoint.keep));
   out.raw("track", list_of(o.track, std::ssize(o.track)));

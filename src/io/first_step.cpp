@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "cairn/crack/traction.hpp"
 #include "cairn/material/registry.hpp"
 #include "case_sections.hpp"
 
@@ -40,6 +41,21 @@ double point_speed_of(const Case& c, int index) {
 
 }  // namespace
 
+double longest_traction_step(const Case& c) {
+  constexpr double stable = 0.5;  // D dt^2 over density times cell; waves through interfaces are stable up to .7
+  double longest = std::numeric_limits<double>::infinity();
+  for (const CrackSpec& crack : c.cracks) {
+    if (!crack.has_tractions()) continue;
+    const TractionLaw law =
+        crack.law == CrackLaw::interface ? TractionLaw(crack.interface) : TractionLaw(crack.cohesive);
+    for (int b = 0; b < std::ssize(c.bodies); ++b)
+      if (crack.cuts(b, c.bodies[b].group) && !reading::is_prescribed(c, b))
+        longest = std::min(longest, std::sqrt(stable * c.materials[c.bodies[b].material].density *
+                                              smallest_cell(c.domain) / law.largest_stiffness()));
+  }
+  return longest;
+}
+
 FirstStep first_step(const Case& c) {
   std::vector<double> waves;
   for (const auto& material : c.materials) waves.push_back(wave_speed_of(material));
@@ -53,7 +69,7 @@ FirstStep first_step(const Case& c) {
   }
   if (!deformable) step.wave_speed = *std::ranges::max_element(waves);
   step.crossing = smallest_cell(c.domain) / (step.wave_speed + step.point_speed);
-  step.dt = c.time.dt > 0 ? c.time.dt : c.time.cfl * step.crossing;
+  step.dt = c.time.dt > 0 ? c.time.dt : std::min(c.time.cfl * step.crossing, longest_traction_step(c));
   return step;
 }
 
@@ -61,7 +77,18 @@ namespace reading {
 
 void check_time_step(Case& c, Errors& errors) {
   constexpr double near = 0.9;  // share of the limit from which a step is said to be long
+  constexpr double worth_telling = 0.5;
   const FirstStep first = first_step(c);
+  const double of_cracks = longest_traction_step(c), of_waves = c.time.cfl * first.crossing;
+  if (c.time.dt > of_cracks)
+    errors.add({c.file.string(), 0}, "time.dt",
+               fmt::format("{:.6g} s is too long for the stiffness between the faces of a crack; give at most {:.6g} s, "
+                           "or leave it to time.cfl",
+                           c.time.dt, of_cracks));
+  if (of_cracks < worth_telling * of_waves)
+    c.warnings.push_back(fmt::format("{}: the stiffness between the faces of a crack makes steps {:.2g} times shorter; "
+                                     "what is so stiff is nearly perfect: leave it out, or make it softer",
+                                     c.file.string(), of_waves / of_cracks));
   if (!(c.time.dt > near * first.crossing)) return;
   const std::string text =
       fmt::format("{:.6g} s is {:.3g} of the time that a wave and a point take through a cell at the start, {:.6g} s",

@@ -36,6 +36,7 @@ bool is_marked(const std::string& name, std::string_view head) {
   if (name == record_file) return head.starts_with(record_mark);
   if (name.starts_with("case_grains_")) return head.starts_with(table_mark);
   if (name == "history.csv") return head.starts_with("step,time,dt,");
+  if (name == "tips.csv") return head.starts_with("step,time,crack,");
   if (name == "forces.csv") return head.starts_with("step,time,tool,");
   if (name == "bodies.csv") return head.starts_with("step,time,body,");
   if (name.ends_with(".series")) return head.starts_with("{\n  \"file-series-version\": \"1.0\",\n  \"files\": [\n");

@@ -94,8 +94,9 @@ MaximumReduction::~MaximumReduction() {
   keep_to_the_end(std::move(largest_));
 }
 
-NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours)
+NeighbourExchange::NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours, int channel)
     : comm_(comm),
+      tag_(exchange_tag + channel),
       neighbours_(std::move(neighbours)),
       outgoing_(neighbours_.size() + 1),
       incoming_(neighbours_.size() + 1) {
@@ -119,7 +120,7 @@ void NeighbourExchange::start() {
     auto& words = outgoing_[i].words();
     if (words.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
       throw RankError("a message to a neighbour exceeds 16 GiB: use more ranks");
-    MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], exchange_tag, comm_,
+    MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], tag_, comm_,
               &requests_[i]);
     ++traffic_.messages;
     traffic_.bytes += static_cast<std::int64_t>(words.size()) * 8;
@@ -134,7 +135,7 @@ bool NeighbourExchange::receive() {
     MPI_Message handle;
     MPI_Status status;
     int count = 0;
-    MPI_Mprobe(neighbours_[i], exchange_tag, comm_, &handle, &status);
+    MPI_Mprobe(neighbours_[i], tag_, comm_, &handle, &status);
     MPI_Get_count(&status, MPI_DOUBLE, &count);
     incoming_[i].words().resize(static_cast<std::size_t>(count));
     MPI_Mrecv(incoming_[i].words().data(), count, MPI_DOUBLE, &handle, MPI_STATUS_IGNORE);

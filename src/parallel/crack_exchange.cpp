@@ -9,6 +9,8 @@
 namespace cairn {
 namespace {
 
+constexpr double longest_segment = 1.0;  // cells
+
 /// The cell of a crack point in its patch's frame; the nearest, where there is a face of the domain.
 template <int Dim>
 Index<Dim> cell_of(const Lattice<Dim>& lattice, const Vec<Dim>& x) {
@@ -46,14 +48,43 @@ CrackPoint<Dim> seen_across(const CrackPoint<Dim>& point, const Link<Dim>& link,
   return seen;
 }
 
+/// Puts points in the middle of segments that the material stretched to more than a cell. Every patch that knows both of
+/// a segment's points finds the same. The new ones stand for no length of a law: their neighbours keep theirs.
+template <int Dim>
+void divide_long_segments(Patch<Dim>& patch, const Lattice<Dim>& lattice) {
+  std::vector<CrackPoint<Dim>> divided;
+  for (std::size_t k = 0; k < patch.cracks.size(); ++k) {
+    divided.push_back(patch.cracks[k]);
+    if (k + 1 == patch.cracks.size()) break;
+    CrackPoint<Dim>& a = divided.back();
+    const CrackPoint<Dim>& b = patch.cracks[k + 1];
+    const double cells = (b.plane - a.plane).cwiseProduct(lattice.inverse_spacing()).norm();
+    if (!a.precedes(b) || !(cells > longest_segment) || b.index - a.index < 2) continue;
+    CrackPoint<Dim> middle = a;
+    middle.index = a.index + (b.index - a.index) / 2, middle.next = b.index;
+    a.next = middle.index;
+    for (auto vector : {&CrackPoint<Dim>::plane, &CrackPoint<Dim>::lower, &CrackPoint<Dim>::upper,
+                        &CrackPoint<Dim>::lower_velocity, &CrackPoint<Dim>::upper_velocity})
+      middle.*vector = 0.5 * (a.*vector + b.*vector);
+    middle.filled = a.filled && b.filled, middle.faces_filled = a.faces_filled & b.faces_filled;
+    middle.bond = {}, middle.traction.setZero();
+    middle.own = patch.cells.contains(cell_of(lattice, middle.plane));
+    divided.push_back(middle);
+  }
+  if (divided.size() > patch.cracks.size()) patch.cracks = std::move(divided);
+}
+
 }  // namespace
 
 template <int Dim>
 void put_crack_point(const CrackPoint<Dim>& point, Message& message) {
-  for (std::int64_t value : {point.crack, point.index, std::int32_t{point.own}, std::int32_t{point.filled}})
+  for (std::int64_t value : {point.crack, point.index, point.next, std::int32_t{point.own}, std::int32_t{point.filled},
+                             std::int32_t{point.faces_filled}, std::int32_t{point.bond.state}})
+    message.put(value);
+  for (const double value : {point.bond.length, point.bond.peak[0], point.bond.peak[1], point.bond.dissipated})
     message.put(value);
   for (const std::int64_t word : std::bit_cast<ImageWords>(point.image)) message.put(word);
-  for (const Vec<Dim>& v : {point.plane, point.lower, point.upper, point.lower_velocity, point.upper_velocity})
+  for (const Vec<Dim>& v : {point.plane, point.lower, point.upper, point.lower_velocity, point.upper_velocity, point.traction})
     for (int d = 0; d < Dim; ++d) message.put(v[d]);
 }
 
@@ -62,9 +93,15 @@ CrackPoint<Dim> take_crack_point(const Message& message, std::size_t& at) {
   CrackPoint<Dim> point;
   point.crack = static_cast<std::int32_t>(message.integer(at++));
   point.index = static_cast<std::int32_t>(message.integer(at++));
+  point.next = static_cast<std::int32_t>(message.integer(at++));
   point.own = message.integer(at++) != 0, point.filled = message.integer(at++) != 0;
+  point.faces_filled = static_cast<int>(message.integer(at++));
+  point.bond.state = static_cast<Bond::State>(message.integer(at++));
+  for (double* value : {&point.bond.length, &point.bond.peak[0], &point.bond.peak[1], &point.bond.dissipated})
+    *value = *message.data(at++);
   point.image = std::bit_cast<Image>(ImageWords{message.integer(at), message.integer(at + 1)}), at += 2;
-  for (Vec<Dim>* v : {&point.plane, &point.lower, &point.upper, &point.lower_velocity, &point.upper_velocity})
+  for (Vec<Dim>* v : {&point.plane, &point.lower, &point.upper, &point.lower_velocity, &point.upper_velocity,
+                      &point.traction})
     for (int d = 0; d < Dim; ++d) (*v)[d] = *message.data(at++);
   return point;
 }
@@ -117,6 +154,7 @@ std::string exchange_cracks(NeighbourExchange& messages, const PatchTable<Dim>& 
     points.erase(
         std::unique(points.begin(), points.end(), [](const auto& a, const auto& b) { return !(a < b) && !(b < a); }),
         points.end());
+    divide_long_segments(patch, lattice);
   }
   return failure;
 }
@@ -166,10 +204,55 @@ void exchange_face_velocities(NeighbourExchange& messages, const PatchTable<Dim>
   for (const Told& t : all) {
     auto patch = std::ranges::lower_bound(patches, t.to, {}, &Patch<Dim>::id);
     const auto point = std::lower_bound(patch->cracks.begin(), patch->cracks.end(), t.point);
-    if (point != patch->cracks.end() && !(t.point < *point) && point->own) point->velocity(t.side) = t.velocity;
+    if (point == patch->cracks.end() || t.point < *point || !point->own) continue;
+    point->velocity(t.side) = t.velocity;
+    point->faces_filled |= CrackPoint<Dim>::filled_bit(t.side);
   }
 }
 
+template <int Dim>
+void exchange_row_forces(NeighbourExchange& messages, const PatchTable<Dim>& table, const std::vector<Patch<Dim>>& patches,
+                         const Lattice<Dim>& lattice, std::vector<std::vector<RowForce<Dim>>>& forces) {
+  messages.begin();
+  for (std::size_t p = 0; p < patches.size(); ++p)
+    for (const auto& link : patches[p].links) {
+      if (forces[p].empty() || table.find(link.patch) < 0) continue;
+      const Box<Dim> theirs = lattice.patch_nodes(link.patch).shifted(link.shift);
+      for (const RowForce<Dim>& f : forces[p]) {
+        if (!theirs.contains(f.place)) continue;
+        Message& message = messages.outgoing(table.owner(link.patch));
+        for (const std::int64_t value : {std::int64_t{link.patch}, std::int64_t{f.from}, std::int64_t{f.crack},
+                                         std::int64_t{f.index}, std::int64_t{f.side}, f.sides.key()})
+          message.put(value);
+        for (int d = 0; d < Dim; ++d) message.put(std::int64_t{f.place[d] - link.shift[d]});
+        for (int d = 0; d < Dim; ++d) message.put(f.force[d]);
+      }
+    }
+  messages.start();
+  messages.receive();
+  const auto read = [&](int rank) {
+    const Message& message = messages.incoming(rank);
+    for (std::size_t at = 0; at < message.size();) {
+      const PatchId to = message.integer(at++);
+      RowForce<Dim> f;
+      f.from = message.integer(at++);
+      f.crack = static_cast<std::int32_t>(message.integer(at++));
+      f.index = static_cast<std::int32_t>(message.integer(at++));
+      f.side = static_cast<int>(message.integer(at++)), f.sides = SideSet(message.integer(at++));
+      for (int d = 0; d < Dim; ++d) f.place[d] = static_cast<int>(message.integer(at++));
+      for (int d = 0; d < Dim; ++d) f.force[d] = *message.data(at++);
+      forces[std::ranges::lower_bound(patches, to, {}, &Patch<Dim>::id) - patches.begin()].push_back(f);
+    }
+  };
+  read(messages.rank());
+  for (int rank : messages.neighbours()) read(rank);
+  for (auto& list : forces) sort_row_forces(list);
+}
+
+template void exchange_row_forces(NeighbourExchange&, const PatchTable<2>&, const std::vector<Patch<2>>&,
+                                  const Lattice<2>&, std::vector<std::vector<RowForce<2>>>&);
+template void exchange_row_forces(NeighbourExchange&, const PatchTable<3>&, const std::vector<Patch<3>>&,
+                                  const Lattice<3>&, std::vector<std::vector<RowForce<3>>>&);
 template void exchange_face_velocities(NeighbourExchange&, const PatchTable<2>&, std::vector<Patch<2>>&,
                                        const Lattice<2>&, const std::vector<std::vector<FaceMotion<2>>>&);
 template void exchange_face_velocities(NeighbourExchange&, const PatchTable<3>&, std::vector<Patch<3>>&,

@@ -132,7 +132,8 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   add("time", state.step.time), add("step", state.step.steps);
   for_each_number(state, add);
   for (const auto& entry : state.series) add(entry.name, entry.time);
-  sum.add_values(std::span(state.tools));
+  sum.add_values(std::span(state.tools)), sum.add_values(std::span(state.cracks));
+  sum.add_values(std::span(state.parts)), sum.add_values(std::span(state.spared));
   add("case", std::ssize(case_text));
   sum.add_values(std::span(case_text.data(), case_text.size()));
   return sum.value();

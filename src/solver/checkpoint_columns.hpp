@@ -57,11 +57,12 @@ inline constexpr CrackVector<Dim> crack_vectors[] = {{"crack_plane", &CrackPoint
                                                      {"crack_upper", &CrackPoint<Dim>::upper},
                                                      {"crack_lower_velocity", &CrackPoint<Dim>::lower_velocity},
                                                      {"crack_upper_velocity", &CrackPoint<Dim>::upper_velocity}};
-inline constexpr int crack_numbers = 6;  // crack, index, filled, image
+inline constexpr int crack_numbers = 9;  // crack, index, next, filled, faces_filled, state of the bond, image
+inline constexpr int bond_numbers = 4;   // length, peaks, dissipated
 inline constexpr const char* patch_cracks_name = "patch_cracks";
 /// Columns that a case with cracks has more.
 template <int Dim>
-inline constexpr int crack_columns = 2 + static_cast<int>(std::size(crack_vectors<Dim>));
+inline constexpr int crack_columns = 3 + static_cast<int>(std::size(crack_vectors<Dim>));
 
 /// The patches that a checkpoint holds: those of which something has to be remembered.
 struct Layout {

@@ -204,14 +204,22 @@ void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lay
   if (layout.cracks.empty()) return;
   in.template read_patches<std::int64_t>(patch_cracks_name);
   const auto numbers = in.template read<std::int32_t>("crack_numbers", crack_numbers, layout.cracks);
+  const auto bonds = in.template read<double>("crack_bonds", bond_numbers, layout.cracks);
   in.settle();
   const std::int32_t* n = numbers.data();
+  const double* bond = bonds.data();
   for (std::size_t at = 0; at < patches.size(); ++at)
-    for (std::int64_t i = 0; i < layout.cracks[layout.here[at]]; ++i, n += crack_numbers) {
+    for (std::int64_t i = 0; i < layout.cracks[layout.here[at]]; ++i, n += crack_numbers, bond += bond_numbers) {
       Patch<Dim>& patch = *patches[at];
       CrackPoint<Dim> point;
-      point.crack = n[0], point.index = n[1], point.filled = n[2] != 0;
-      for (int d = 0; d < 3; ++d) point.image[d] = n[3 + d];
+      point.crack = n[0], point.index = n[1], point.next = n[2], point.filled = n[3] != 0, point.faces_filled = n[4] & 3;
+      point.bond = {n[5] == Bond::holds || n[5] == Bond::broken ? Bond::State{n[5]} : Bond::none,
+                    bond[0],
+                    {bond[1], bond[2]},
+                    bond[3]};
+      for (int d = 0; d < 3; ++d) point.image[d] = n[6 + d];
+      in.require(std::all_of(bond, bond + bond_numbers, [](double x) { return std::isfinite(x) && x >= 0; }),
+                 "it holds laws of crack points that are not finite");
       const bool known =
           n[0] >= 0 && n[0] < std::ssize(cracks) && n[1] >= cracks[n[0]].ends[0] && n[1] <= cracks[n[0]].ends[1];
       in.require(known, fmt::format("it holds point {} of crack {}, which the case does not have", n[1], n[0]));
@@ -260,6 +268,9 @@ RunState read_state(const CheckpointReader& reader) {
   });
   state.step.time = reader.table().time(), state.step.steps = reader.table().step();
   state.tools = reader.column<double>("tool_state", tool_state_size);
+  state.cracks = reader.column<double>("crack_state", Crack::state_size);
+  state.parts = reader.column<double>("part_of");
+  state.spared = reader.column<double>("crack_spared", 2);
   const auto times = reader.column<double>("series_time");
   std::istringstream names(reader.text("series_names"));
   std::size_t listed = 0;

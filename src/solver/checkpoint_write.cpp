@@ -178,10 +178,13 @@ void write_cracks(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const L
         if (point.own) f(point);
   };
   for_own([&](const CrackPoint<Dim>& p) {
-    numbers.insert(numbers.end(), {p.crack, p.index, p.filled, p.image[0], p.image[1], p.image[2]});
+    numbers.insert(numbers.end(), {p.crack, p.index, p.next, p.filled, p.faces_filled, p.bond.state, p.image[0],
+                                   p.image[1], p.image[2]});
+    values.insert(values.end(), {p.bond.length, p.bond.peak[0], p.bond.peak[1], p.bond.dissipated});
   });
   write_counts(out, layout, patch_cracks_name, layout.cracks);
   out.write("crack_numbers", crack_numbers, layout.cracks, numbers);
+  out.write("crack_bonds", bond_numbers, layout.cracks, values);
   for (const auto& vector : crack_vectors<Dim>) {
     values.clear();
     for_own([&](const CrackPoint<Dim>& p) {
@@ -214,6 +217,9 @@ void write_state(CheckpointWriter& writer, const RunState& state, MPI_Comm comm)
   for (const auto& entry : state.series) times.push_back(entry.time), names += entry.name + "\n";
   write_on_first(writer, "series_time", 1, times, comm);
   write_on_first(writer, "tool_state", tool_state_size, state.tools, comm);
+  write_on_first(writer, "crack_state", Crack::state_size, state.cracks, comm);
+  write_on_first(writer, "part_of", 1, state.parts, comm);
+  write_on_first(writer, "crack_spared", 2, state.spared, comm);
   writer.add_text("series_names", names);
 }
 

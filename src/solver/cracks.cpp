@@ -8,6 +8,7 @@
 #include "cairn/io/agreement.hpp"
 #include "cairn/parallel/crack_exchange.hpp"
 #include "cairn/solver/simulation.hpp"
+#include "tractions.hpp"
 
 namespace cairn {
 namespace {
@@ -16,8 +17,9 @@ constexpr double segment_length = 0.5;            // cells, at set-up
 constexpr double on_crack = 1e-3, beside = 0.25;  // cells from a crack at which a point lies on it, or beside it
 constexpr double most_on_crack = 0.1;             // of the points beside it
 
-/// The crack's line in segments of at most half a cell.
-std::vector<Vec3> refined(const CrackSpec& spec, double spacing) {
+}  // namespace
+
+std::vector<Vec3> refined_crack(const CrackSpec& spec, double spacing) {
   std::vector<Vec3> points = {spec.points[0]};
   for (std::size_t i = 1; i < spec.points.size(); ++i) {
     const Vec3 from = spec.points[i - 1], step = spec.points[i] - from;
@@ -28,9 +30,23 @@ std::vector<Vec3> refined(const CrackSpec& spec, double spacing) {
   return points;
 }
 
-PairLaw law_between_faces(const CrackSpec& spec) {
-  if (spec.law == CrackLaw::stick) return {ContactLaw::stick, 0};
-  return {ContactLaw::friction, spec.law == CrackLaw::friction ? spec.friction : 0.0};
+namespace {
+
+/// How faces meet. An interface that is perfect in a direction binds them there.
+CrackContact contact_of(const CrackSpec& spec) {
+  using Tie = CrackContact::Tie;
+  CrackContact contact;
+  contact.law = {ContactLaw::friction, spec.friction};
+  if (spec.law == CrackLaw::frictionless || spec.law == CrackLaw::interface) contact.law.friction = 0;
+  if (spec.law == CrackLaw::stick) contact.law = {ContactLaw::stick, 0};
+  if (spec.law == CrackLaw::free) contact.meets = false;
+  if (spec.law != CrackLaw::interface) return contact;
+  const bool opens = std::isfinite(spec.interface.opening), slips = std::isfinite(spec.interface.sliding);
+  contact.meets = opens && !std::isfinite(spec.interface.closing);
+  if (!opens && slips) contact.tie = Tie::normal;
+  if (opens && !slips) contact.tie = Tie::slip;
+  if (!opens && !slips) contact.meets = true, contact.law = {ContactLaw::stick, 0};
+  return contact;
 }
 
 }  // namespace
@@ -42,15 +58,18 @@ void Simulation<Dim>::define_cracks(const Case& c) {
   for (const Body& body : bodies_) crack_densities_.push_back(body.rigid ? 0.0 : materials_[body.material].density);
   for (const CrackSpec& spec : c.cracks) {
     Crack crack;
-    crack.ends = {0, static_cast<int>(refined(spec, lattice_.smallest_spacing()).size()) - 1};
+    const auto segments = static_cast<int>(refined_crack(spec, lattice_.smallest_spacing()).size()) - 1;
+    crack.ends = {0, segments * CrackPoint<Dim>::index_step};
     crack.open = {spec.ends[0] == CrackEnd::open, spec.ends[1] == CrackEnd::open};
-    crack.all_bodies = spec.groups.empty();
+    crack.all_bodies = spec.cuts_all();
     for (std::size_t b = 0; b < c.bodies.size() && !crack.all_bodies; ++b)
-      if (std::ranges::find(spec.groups, c.bodies[b].group) != spec.groups.end())
-        crack.bodies.push_back(static_cast<int>(b));
-    contact_.cracks.push_back({spec.law != CrackLaw::free, law_between_faces(spec), crack.all_bodies, crack.bodies});
-    cracks_.push_back(std::move(crack));
+      if (spec.cuts(static_cast<int>(b), c.bodies[b].group)) crack.bodies.push_back(static_cast<int>(b));
+    contact_.cracks.push_back(contact_of(spec));
+    cracks_.push_back(std::move(crack)), growth_.push_back(spec.growth);
   }
+  split_every_ = c.crack.split;
+  tell_contact_of_cracks();
+  define_tractions(c);
 }
 
 /// Calls f(crack, index, position, patch) for every point of the case's cracks, with the patch whose cells hold it.
@@ -58,7 +77,7 @@ template <int Dim>
 template <class F>
 void Simulation<Dim>::for_crack_points(const Case& c, F&& f) const {
   for (std::size_t k = 0; k < c.cracks.size(); ++k) {
-    const auto line = refined(c.cracks[k], lattice_.smallest_spacing());
+    const auto line = refined_crack(c.cracks[k], lattice_.smallest_spacing());
     for (std::size_t i = 0; i < line.size(); ++i) {
       const Vec<Dim> x = line[i].template head<Dim>();
       Index<Dim> cell;
@@ -84,11 +103,13 @@ template <int Dim>
 void Simulation<Dim>::place_cracks(const Case& c) {
   for_crack_points(c, [&](int crack, int index, const Vec<Dim>& x, PatchId id) {
     CrackPoint<Dim> point;
-    point.crack = crack, point.index = index;
+    point.crack = crack, point.index = index * CrackPoint<Dim>::index_step;
+    point.next = std::min(point.index + CrackPoint<Dim>::index_step, cracks_[crack].ends[1]);
     point.plane = point.lower = point.upper = x;
     const auto patch = std::ranges::lower_bound(patches_, id, {}, &Patch<Dim>::id);
     if (patch != patches_.end() && patch->id == id) patch->cracks.push_back(point);
   });
+  bind_faces(c);
   receive_cracks();
   check_points_on_cracks(c);
 }
@@ -163,6 +184,26 @@ void Simulation<Dim>::receive_cracks() {
   for (auto& patch : patches_)
     if (!patch.cracks.empty())
       for (auto& piece : patch.pieces) piece.projected = false;
+  follow_openings();
+}
+
+template <int Dim>
+void Simulation<Dim>::restore_cracks(const std::vector<double>& states) {
+  bool whole = states.size() == cracks_.size() * Crack::state_size;
+  for (std::size_t k = 0; whole && k < cracks_.size(); ++k) {
+    const double* state = &states[k * Crack::state_size];
+    whole = std::all_of(state, state + Crack::state_size, [](double x) { return std::abs(x) < 1e9; });
+    if (whole) cracks_[k].restore(state);
+    whole = whole && cracks_[k].ends[0] < cracks_[k].ends[1];
+  }
+  if (!whole) throw InputError("the checkpoint's cracks are not those of the case");
+}
+
+template <int Dim>
+std::vector<double> Simulation<Dim>::crack_states() const {
+  std::vector<double> states(cracks_.size() * Crack::state_size);
+  for (std::size_t k = 0; k < cracks_.size(); ++k) cracks_[k].state_of(&states[k * Crack::state_size]);
+  return states;
 }
 
 #define CAIRN_INSTANTIATE(Dim)                                                         \
@@ -172,6 +213,8 @@ void Simulation<Dim>::receive_cracks() {
   template void Simulation<Dim>::check_points_on_cracks(const Case&);                  \
   template void Simulation<Dim>::find_cracks(Patch<Dim>&);                             \
   template void Simulation<Dim>::move_cracks();                                        \
+  template void Simulation<Dim>::restore_cracks(const std::vector<double>&);           \
+  template std::vector<double> Simulation<Dim>::crack_states() const;                  \
   template void Simulation<Dim>::receive_cracks();
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

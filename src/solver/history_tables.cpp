@@ -24,6 +24,7 @@ std::vector<std::string> history_columns(int dimension) {
                              "filter_dissipation", "contact_gain", "points_stopped", "points_left", "points_lost",
                              "mass_left", "energy_left", "momentum_left_x", "momentum_left_y"});
   if (dimension == 3) names.emplace_back("momentum_left_z");
+  names.insert(names.end(), {"crack_energy", "crack_dissipation"});
   return names;
 }
 
@@ -35,6 +36,10 @@ std::vector<std::string> body_columns(int dimension) {
 std::vector<std::string> force_columns() {
   return {"step", "time", "tool", "name", "x",  "y",  "z",  "vx",        "vy",        "vz",        "wx",  "wy",
           "wz",   "fx",   "fy",   "fz",   "mx", "my", "mz", "impulse_x", "impulse_y", "impulse_z", "work"};
+}
+
+std::vector<std::string> tip_columns() {
+  return {"step", "time", "crack", "end", "x", "y", "ahead_x", "ahead_y", "grown", "J", "J_static", "K_I", "K_II"};
 }
 
 template <int Dim>
@@ -51,6 +56,10 @@ void HistoryTables<Dim>::open(const RunState* from) {
     forces_ = CsvWriter(forces, force_columns(), from->forces_file);
   else if (with_forces_)
     forces_ = CsvWriter(forces, force_columns());
+  if (go_on && from->tips_file.bytes > 0)
+    tips_ = CsvWriter(out_ / "tips.csv", tip_columns(), from->tips_file);
+  else if (with_tips_)
+    tips_ = CsvWriter(out_ / "tips.csv", tip_columns());
 }
 
 template <int Dim>
@@ -58,6 +67,7 @@ void HistoryTables<Dim>::note_positions(RunState& state) const {
   state.history_file = history_.position();
   if (bodies_.position().bytes > 0) state.bodies_file = bodies_.position();
   if (forces_.position().bytes > 0) state.forces_file = forces_.position();
+  if (tips_.position().bytes > 0) state.tips_file = tips_.position();
 }
 
 template <int Dim>
@@ -77,6 +87,7 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   row.emplace_back(static_cast<std::int64_t>(t.points_lost));
   for (const double left : {t.mass_left, t.energy_left, t.momentum_left_x, t.momentum_left_y}) row.emplace_back(left);
   if (Dim == 3) row.emplace_back(t.momentum_left_z);
+  row.emplace_back(t.crack_energy), row.emplace_back(t.crack_dissipation);
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }
@@ -118,6 +129,18 @@ void HistoryTables<Dim>::add_forces(const Simulation<Dim>& simulation) {
       for (int i = 0; i < 3; ++i) row.emplace_back(dt > 0 ? v[i] / dt : 0.0);
     for (int i : {0, 1, 2, 6}) row.emplace_back(sum.total[i]);
     forces_.add_row(row);
+  }
+}
+
+template <int Dim>
+void HistoryTables<Dim>::add_tips(Simulation<Dim>& simulation) {
+  for (const TipState& s : simulation.tip_states()) {
+    std::vector<CsvValue> row = {simulation.steps(), simulation.time(), std::int64_t{s.tip.crack},
+                                 std::int64_t{s.tip.end}};
+    for (const double value : {s.tip.position.x(), s.tip.position.y(), s.tip.ahead.x(), s.tip.ahead.y(), s.length, s.J,
+                               s.J_static, s.K_opening, s.K_sliding})
+      row.emplace_back(value);
+    tips_.add_row(row);
   }
 }
 

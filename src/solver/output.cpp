@@ -215,6 +215,11 @@ void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path
   auto& crack = columns.add_ints("crack", 1);
   auto& index = columns.add_ints("index", 1);
   auto& image = columns.add_ints("image", 3);
+  auto& bond = columns.add_ints("bond", 1);
+  auto& traction = columns.add_doubles("traction", 3);
+  auto& length = columns.add_doubles("length", 1);
+  auto& stored = columns.add_doubles("stored", 1);
+  auto& dissipated = columns.add_doubles("dissipated", 1);
   const auto padded = [](const Vec<Dim>& v) {
     Vec3 p = Vec3::Zero();
     p.template head<Dim>() = v;
@@ -227,6 +232,9 @@ void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path
       append(opening, padded(p.opening()));
       crack.push_back(p.crack), index.push_back(p.index);
       for (int d = 0; d < 3; ++d) image.push_back(d < Dim ? p.image[d] : 0);
+      const auto energies = simulation.energies_of(p);
+      bond.push_back(p.bond.state), length.push_back(p.bond.length), append(traction, padded(p.traction));
+      stored.push_back(energies[0]), dissipated.push_back(energies[1]);
     }
   const RowBlocks rows = patch_rows(
       simulation, [](const Patch<Dim>& patch) { return std::ranges::count_if(patch.cracks, &CrackPoint<Dim>::own); });

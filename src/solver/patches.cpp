@@ -27,10 +27,12 @@ void Simulation<Dim>::connect_patches() {
       if (table_.find(link.patch) >= 0) neighbours.insert(table_.owner(link.patch));
   neighbours.erase(rank_);
   sweeps_.assign(patches_.size(), {}), segments_.assign(patches_.size(), {});
-  face_motions_.assign(patches_.size(), {});
+  face_motions_.assign(patches_.size(), {}), row_forces_.assign(patches_.size(), {});
   const Traffic traffic = messages_ ? messages_->traffic() : Traffic{};
   messages_ = std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()));
   messages_->traffic() = traffic;
+  traction_messages_ =
+      std::make_unique<NeighbourExchange>(comm_, std::vector<int>(neighbours.begin(), neighbours.end()), 1);
   exchange_ = std::make_unique<NodeExchange<Dim>>(*messages_, table_, patches_);
   beside_others_.clear();
   for (std::size_t p = 0; p < patches_.size(); ++p) beside_others_.push_back(exchange_->beside_others(p));

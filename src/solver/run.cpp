@@ -53,15 +53,16 @@ class Run {
         grains_(c.output.grains),
         contacts_(c.output.contacts),
         forces_(c.output.forces),
+        tips_(c.output.tips),
         history_clock_(c.output.history),
         checkpoints_(c.output.checkpoint),
         particle_index_(settings.out / "particles.hdf.series"),
-        tables_(settings.out, c.output.track, c.output.forces.active()),
+        tables_(settings.out, c.output.track, c.output.forces.active(), c.output.tips.active()),
         book_(energy_that_matters(c)) {
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &ranks_);
     for (const Schedule* s : {&c.output.particles, &c.output.grains, &c.output.contacts, &c.output.forces,
-                              &c.output.history, &c.output.checkpoint})
+                              &c.output.tips, &c.output.history, &c.output.checkpoint})
       needs_wall_ = needs_wall_ || s->interval_wall > 0;
     if (from) restore(from->state());
     simulation_.ask([this] { return notice(); });
@@ -213,6 +214,7 @@ class Run {
     const auto name = [](const char* kind, const OutputClock& clock) { return numbered_name(kind, clock.count() - 1); };
     if (wanted(history_clock_)) write_history();
     if (wanted(forces_)) tables_.add_forces(simulation_);
+    if (wanted(tips_)) tables_.add_tips(simulation_);
     if (wanted(particles_)) {
       const std::string file = name("particles", particles_);
       write_particles(simulation_, next_result(file), case_.output.particles.fields);
@@ -267,11 +269,12 @@ class Run {
     flush_results();  // what comes before a checkpoint is not written again
     RunState state;
     state.step = simulation_.step_state();
-    state.tools = simulation_.tool_states();
+    state.tools = simulation_.tool_states(), state.cracks = simulation_.crack_states();
+    state.parts = simulation_.parts(), state.spared = simulation_.spared();
     tables_.note_positions(state);
     share_rank_zero(state);
     state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
-    state.forces = forces_.state(), state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
+    state.forces = forces_.state(), state.tips = tips_.state(), state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
     state.contacts_cleared = contacts_cleared_, state.contacts_kept = contacts_kept();
     state.series = particle_index_.entries();
     state.bodies = bodies_checksum(case_);
@@ -289,12 +292,13 @@ class Run {
     MPI_Bcast(&state.wall, 1, MPI_DOUBLE, 0, comm_);
     MPI_Bcast(&state.history_file, sizeof state.history_file, MPI_BYTE, 0, comm_);
     MPI_Bcast(&state.bodies_file, sizeof state.bodies_file, MPI_BYTE, 0, comm_);
+    MPI_Bcast(&state.tips_file, sizeof state.tips_file, MPI_BYTE, 0, comm_);
     MPI_Bcast(&state.forces_file, sizeof state.forces_file, MPI_BYTE, 0, comm_);
   }
 
   void restore(const RunState& state) {
     particles_.restore(state.particles), grains_.restore(state.grains), contacts_.restore(state.contacts);
-    forces_.restore(state.forces), history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
+    forces_.restore(state.forces), tips_.restore(state.tips), history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
     book_.restore(state.energy);
     // Contacts that this run is the first to keep are summed from now on.
     contacts_cleared_ = contacts_kept() && !state.contacts_kept ? simulation_.time() : state.contacts_cleared;
@@ -368,7 +372,7 @@ class Run {
   StopSignals signals_;
   double start_;
   Simulation<Dim> simulation_;
-  OutputClock particles_, grains_, contacts_, forces_, history_clock_, checkpoints_;
+  OutputClock particles_, grains_, contacts_, forces_, tips_, history_clock_, checkpoints_;
   SeriesIndex particle_index_;
   HistoryTables<Dim> tables_;
   EnergyBook book_;

@@ -371,6 +371,8 @@ void Simulation<Dim>::restore(const Checkpoint& from) {
   for (std::size_t p = 0; p < from.patches().size(); ++p)
     if (from.points()[p] > 0) filled.push_back(from.patches()[p]), points.push_back(from.points()[p]);
   make_patches(filled, points, from.patches());
+  restore_cracks(from.state().cracks);
+  restore_parts(from.state().parts, from.state().spared);
   from.fill(patches_, lattice_, bodies_, materials_, cracks_);
   connect_patches();
   receive_cracks();

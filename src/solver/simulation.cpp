@@ -52,6 +52,8 @@ void Simulation<Dim>::step(double longest) {
   const bool again = projects_again();
   const double share = update == StressUpdate::both ? 0.5 : 1.0;
 
+  grow_cracks();
+  split_bodies();
   choose_time_step(longest);
   begin_tools();
   filter_noise();
@@ -63,6 +65,7 @@ void Simulation<Dim>::step(double longest) {
       contact_before_update(p, patch);
       strain_first(patch, share);
     });
+    exchange_tractions();
     look_for_fault(2);
   }
   const auto update_momentum = [&](std::size_t p, P& patch) {
@@ -98,10 +101,15 @@ void Simulation<Dim>::choose_time_step(double longest) {
         "step {}: time.dt = {:.6g} s is longer than a wave or point takes through a cell, {:.6g} s (wave speed {:.6g} "
         "m/s, point speed {:.6g} m/s); give a smaller time.dt, or leave it to time.cfl",
         steps_ + 1, limits_.dt, cell / speed, maxima_[0], maxima_[1]));
+  if (limits_.dt > traction_dt_)
+    throw RunError(fmt::format("step {}: time.dt = {:.6g} s is too long for the stiffness between the faces of a crack; "
+                               "give at most {:.6g} s, or leave it to time.cfl",
+                               steps_ + 1, limits_.dt, traction_dt_));
   if (speed > 0 || dt_ == 0) dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * cell / speed;  // else no point is left
   if (!(dt_ > 0) || !std::isfinite(dt_))
     throw RunError(fmt::format("step {}: the time step collapsed (wave speed {} m/s, point speed {} m/s)", steps_ + 1,
                                maxima_[0], maxima_[1]));
+  dt_ = std::min(dt_, traction_dt_);
   // Reach the end exactly, without a last step of a rounding error's length.
   if (dt_ * (1 + 1e-9) >= longest) dt_ = longest;
 }
@@ -168,6 +176,7 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
       });
     if (!projects_again()) velocities_.take_back(piece.nodes.velocity);
   });
+  find_tractions(&patch - patches_.data());
 }
 
 template <int Dim>
@@ -175,6 +184,7 @@ void Simulation<Dim>::complete_forces(std::size_t p, Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::exchange);
   fetch_nodes(patch);
   exchange_->add(patch, p);
+  if (!row_forces_[p].empty()) add_row_forces(patch, surroundings_of(patch), row_forces_[p]);
   mirror_vectors(patch, lattice_, contact_.faces, &NodeBox<Dim>::force);
 }
 

@@ -19,16 +19,6 @@ void set_moduli(CrackTip& tip, const Material& material) {
   tip.shear_modulus = mu;
 }
 
-/// The numbers of all ranks one after the other, on every rank. Collective.
-std::vector<double> gather_everywhere(const std::vector<double>& mine, MPI_Comm comm) {
-  std::vector<double> all = gather_on_first(mine, comm);
-  auto size = static_cast<std::int64_t>(all.size());
-  MPI_Bcast(&size, 1, MPI_INT64_T, 0, comm);
-  all.resize(static_cast<std::size_t>(size));
-  MPI_Bcast(all.data(), static_cast<int>(size), MPI_DOUBLE, 0, comm);
-  return all;
-}
-
 /// Continuous distance from the tip, the shortest across periodic boundaries.
 template <int Dim>
 Vec<2> beside(const Lattice<Dim>& lattice, Vec<2> x, const Vec<2>& tip) {
@@ -55,7 +45,7 @@ std::vector<CrackTip> Simulation<Dim>::find_tips() const {
                                  point.plane[1], ahead[0], ahead[1]});
       }
     }
-  const std::vector<double> all = gather_everywhere(mine, comm_);
+  const std::vector<double> all = gather_on_all(mine, comm_);
   std::vector<CrackTip> tips;
   for (std::size_t i = 0; i < all.size(); i += 6) {
     CrackTip tip;
@@ -69,9 +59,9 @@ std::vector<CrackTip> Simulation<Dim>::find_tips() const {
 }
 
 /// Accelerations and velocities of nodes as in a step from here, contact included, without changing anything that
-/// stays.
+/// stays. Returns the length of that step.
 template <int Dim>
-void Simulation<Dim>::find_motion() {
+double Simulation<Dim>::find_motion() {
   ContactSettings<Dim> contact = contact_;
   contact.keep_contacts = false;
   // Before the first step: that of a wave.
@@ -85,11 +75,38 @@ void Simulation<Dim>::find_motion() {
     mirror_sums(patch, lattice_, contact.faces);
     sweeps_[p].find(patch, lattice_, contact, bodies_);
     sweeps_[p].first_pass(patch, lattice_, contact, dt);
+    find_tractions(p);
+  });
+  exchange_tractions();
+  for_patches([&](std::size_t p, Patch<Dim>& patch) {
+    add_row_forces(patch, surroundings_of(patch), row_forces_[p]);
     sweeps_[p].second_pass(patch, lattice_, contact, dt, true);
     for (auto& piece : patch.pieces) integrate(piece, dt), piece.projected = false;
     constrain_motion(patch, lattice_, contact.faces, bodies_, dt, true);
   });
-  for (std::size_t p = 0; p < patches_.size(); ++p) patches_[p].ledger = ledgers[p];
+  for (std::size_t p = 0; p < patches_.size(); ++p) patches_[p].ledger = ledgers[p], row_forces_[p].clear();
+  return dt;
+}
+
+/// What contact forces between faces add to the integrals: those of the step that `find_motion` took.
+template <int Dim>
+void Simulation<Dim>::add_face_terms(std::size_t p, const std::vector<CrackTip>& tips, double dt,
+                                     std::vector<TipSums>& sums) const {
+  if constexpr (Dim == 2) {
+    const double h = lattice_.smallest_spacing();
+    sweeps_[p].for_forces_across(dt, [&](const Index<2>& place, int crack, const Vec<2>& force) {
+      Vec<2> x;
+      for (int d = 0; d < 2; ++d) x[d] = lattice_.node_position(d, place[d]);
+      for (std::size_t t = 0; t < tips.size(); ++t) {
+        if (tips[t].crack != crack) continue;
+        const Vec<2> near = beside(lattice_, x, tips[t].position);
+        // Above is left of the crack's direction, and of the tip's at its last end alone.
+        const Vec<2> on_left = tips[t].end == 1 ? force : Vec<2>(-force);
+        const TipSums add = face_terms(tips[t], near, on_left, h, j_radius_[0] * h, j_radius_[1] * h);
+        sums[t].I_opening += add.I_opening, sums[t].I_sliding += add.I_sliding;
+      }
+    });
+  }
 }
 
 /// What a patch's points add to the tips' integrals.
@@ -151,18 +168,19 @@ std::vector<TipState> Simulation<Dim>::tip_states() {
         break;
       }
   }
-  find_motion();
+  const double dt = find_motion();
   std::vector<double> mine;
-  for (const auto& patch : patches_) {
+  for (std::size_t p = 0; p < patches_.size(); ++p) {
     std::vector<TipSums> sums(tips.size());
-    add_tip_terms(patch, tips, sums);
-    mine.push_back(patch.id);
+    add_tip_terms(patches_[p], tips, sums);
+    if (!patches_[p].pieces.empty()) add_face_terms(p, tips, dt, sums);
+    mine.push_back(static_cast<double>(patches_[p].id));
     for (const TipSums& s : sums) mine.insert(mine.end(), {s.J, s.J_static, s.I_opening, s.I_sliding});
   }
-  const std::vector<double> all = gather_everywhere(mine, comm_);
+  const std::vector<double> all = gather_on_all(mine, comm_);
   const std::size_t row = 1 + TipSums::size * tips.size();
-  std::map<int, const double*> by_patch;
-  for (std::size_t i = 0; i < all.size(); i += row) by_patch[static_cast<int>(all[i])] = &all[i + 1];
+  std::map<double, const double*> by_patch;
+  for (std::size_t i = 0; i < all.size(); i += row) by_patch[all[i]] = &all[i + 1];
   std::vector<TipState> states;
   for (std::size_t t = 0; t < tips.size(); ++t) {
     TipSums sum;
@@ -171,14 +189,17 @@ std::vector<TipState> Simulation<Dim>::tip_states() {
       sum.J += v[0], sum.J_static += v[1], sum.I_opening += v[2], sum.I_sliding += v[3];
     }
     const double half = tips[t].modulus > 0 ? 0.5 * tips[t].modulus : std::numeric_limits<double>::quiet_NaN();
-    states.push_back({tips[t], sum.J, sum.J_static, half * sum.I_opening, half * sum.I_sliding});
+    states.push_back({tips[t], sum.J, sum.J_static, half * sum.I_opening, half * sum.I_sliding,
+                      cracks_[tips[t].crack].grown[tips[t].end]});
   }
   return states;
 }
 
 #define CAIRN_INSTANTIATE(Dim)                                                                                         \
   template std::vector<CrackTip> Simulation<Dim>::find_tips() const;                                                   \
-  template void Simulation<Dim>::find_motion();                                                                        \
+  template double Simulation<Dim>::find_motion();                                                                      \
+  template void Simulation<Dim>::add_face_terms(std::size_t, const std::vector<CrackTip>&, double,                     \
+                                                std::vector<TipSums>&) const;                                          \
   template void Simulation<Dim>::add_tip_terms(const Patch<Dim>&, const std::vector<CrackTip>&, std::vector<TipSums>&) \
       const;                                                                                                           \
   template std::vector<TipState> Simulation<Dim>::tip_states();

@@ -8,8 +8,9 @@ namespace cairn {
 namespace {
 
 // Of points: mass, that of deformable bodies, kinetic, spin, strain, potential, plastic and viscous energy, momentum.
-constexpr int point_sums = 11, ledger_sums = static_cast<int>(std::size(ledger_columns));
-constexpr int sum_count = point_sums + ledger_sums;
+// Then the ledger, and of crack points: energy stored and dissipated.
+constexpr int point_sums = 11, ledger_sums = static_cast<int>(std::size(ledger_columns)), crack_sums = 2;
+constexpr int sum_count = point_sums + ledger_sums + crack_sums;
 using Sums = std::array<double, sum_count>;
 
 template <int Dim>
@@ -32,6 +33,7 @@ Totals totals_of(const Sums& sums) {
   t.mass = sums[0], t.deformable_mass = sums[1], t.kinetic = sums[2], t.strain = sums[4], t.potential = sums[5];
   t.plastic = sums[6], t.viscous = sums[7], t.momentum = Vec3(sums[8], sums[9], sums[10]);
   for (int i = 0; i < ledger_sums; ++i) t.*ledger_columns[i].value = sums[point_sums + i];
+  t.crack_energy = sums[sum_count - crack_sums], t.crack_dissipation = sums[sum_count - crack_sums + 1];
   t.numerical = t.blended_and_spun - sums[3];
   return t;
 }
@@ -47,6 +49,10 @@ Totals Simulation<Dim>::totals() const {
     Sums sums{};
     for (const auto& piece : patch.pieces) add_piece(*this, piece, sums);
     for (int i = 0; i < ledger_sums; ++i) sums[point_sums + i] = patch.ledger.*ledger_columns[i].value;
+    for (const auto& point : patch.cracks) {
+      const auto energies = point.own ? energies_of(point) : std::array<double, crack_sums>{};
+      for (int i = 0; i < crack_sums; ++i) sums[sum_count - crack_sums + i] += energies[i];
+    }
     mine.push_back(std::bit_cast<double>(patch.id));
     mine.insert(mine.end(), sums.begin(), sums.end());
   }

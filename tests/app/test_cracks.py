@@ -35,6 +35,29 @@ SETTINGS = {"time.steps": 60, "domain.cells": "[25, 25]", "domain.patch_cells": 
             "bodies.0.shape.centre": "[0.3537, 0.3613]", "bodies.1.shape.centre": "[0.6441, 0.6329]",
             "bodies.0.velocity": "[2.0, 1.2]", "bodies.1.velocity": "[-2.0, -1.6]", "bodies.0.angular_velocity": 3.0,
             "bodies.0.group": '"left"'}
+# One that grows with a cohesive law until it cuts the disk in two, an interface, and a cohesive one.
+GROWING = """
+[[cracks]]
+points = [[0.13, 0.3611], [0.3, 0.3611]]
+ends = ["open", "tip"]
+bodies = ["left"]
+cohesive = { shape = "exponential", strength = 300.0, energy = 0.2 }
+growth = { criterion = "steady", speed = 2.0, cohesive = true }
+
+[[cracks]]
+points = [[0.6441, 0.86], [0.6441, 0.4]]
+law = "interface"
+normal_stiffness = 1.0e6
+tangential_stiffness = 3.0e5
+
+[[cracks]]
+points = [[0.45, 0.5713], [0.85, 0.5713]]
+law = "cohesive"
+cohesive = { strength = [300.0, 200.0], energy = [1.0, 2.0], exponent = 1.0 }
+
+[crack]
+split = 20
+"""
 ERRORS = {  # what is wrong, and a part of the message
     "points = [[0.2, 0.3]]": "needs at least 2",
     "points = [[0.2, 0.3], [1.4, 0.3]]": "lies outside the domain",
@@ -45,6 +68,20 @@ ERRORS = {  # what is wrong, and a part of the message
     'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "glue"': "is not a choice",
     'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "stick"\nfriction = 0.1': "only for cracks with law",
     'points = [[0.05, 0.3], [0.6, 0.3]]\nbodies = ["nobody"]': "no body has the group",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nids = [7]': "body 7 does not exist",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "interface"': "perfect in all directions",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "interface"\nclosing_stiffness = 1e6\ntangential_stiffness = 1e6':
+        "needs normal_stiffness",
+    "points = [[0.05, 0.3], [0.6, 0.3]]\nnormal_stiffness = 1e6": "only for cracks with law = \"interface\"",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "cohesive"': "cohesive: is missing",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "cohesive"\ncohesive = { strength = 1e3 }': "energy: is missing",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\nlaw = "cohesive"\ncohesive = { strength = 1e3, energy = -1.0 }': "energy",
+    'points = [[0.05, 0.3], [0.6, 0.3]]\ngrowth = { criterion = "energy", energy = 1.0 }': "the crack has none",
+    'points = [[0.05, 0.3], [0.3, 0.3]]\nends = ["open", "tip"]\ngrowth = { criterion = "energy" }': "energy",
+    'points = [[0.05, 0.3], [0.3, 0.3]]\nends = ["open", "tip"]\ngrowth = { criterion = "hoop", energy = 1.0 }':
+        "of \"hoop\" give the toughness",
+    'points = [[0.05, 0.3], [0.3, 0.3]]\nends = ["open", "tip"]\n'
+    'growth = { criterion = "energy", energy = 1.0, cohesive = true }': "needs the crack's cohesive law",
 }
 
 
@@ -60,6 +97,40 @@ def differences(a: Path, b: Path) -> list[str]:
     for name in sorted(in_a & in_b):
         lines += [f"{name}: {line}" for line in compare_runs.compare_files(a / name, b / name)]
     return lines
+
+
+def check_growth(cairn: Program, case: Path, scratch: Path) -> list[str]:
+    """Laws, growth and split on several ranks, and from a checkpoint in the middle of them on another number."""
+    settings = SETTINGS | {"time.steps": 120, "output.checkpoint": "{ every = 40, keep = 5 }",
+                           "output.tips": "{ every = 10 }"}
+    failures = []
+    for ranks in (1, 2, 3, 5):
+        done = cairn("run", case, "--out", scratch / f"growing_{ranks}", *sets(settings), ranks=ranks, timeout=300)
+        if done.code != 0:
+            return [f"growth on {ranks} ranks: exit code {done.code}: {done.err}"]
+        if ranks > 1:
+            different = differences(scratch / "growing_1", scratch / f"growing_{ranks}")
+            failures += [f"growth on {ranks} ranks: {line}" for line in different[:5]]
+    one = scratch / "growing_1"
+    with h5py.File(one / "particles_000006.vtkhdf") as file:
+        bodies = np.unique(file["VTKHDF/PointData/body"][:] if "VTKHDF" in file else file["body"][:])
+    if len(bodies) != 3:
+        failures.append(f"the disk that was cut is not two bodies: {bodies}")
+    with h5py.File(one / "cracks_000006.h5") as file:
+        if not (file["bond"][:] == 2).any() or not (file["dissipated"][:].sum() > 0):
+            failures.append("no cohesive law broke")
+    tips = (one / "tips.csv").read_text().splitlines()
+    if len(tips) < 5 or float(tips[4].split(",")[8]) <= 0:
+        failures.append(f"tips.csv: {tips[:5]}")
+    for ranks, checkpoint in ((3, 0), (2, 1)):
+        out = scratch / f"growing_on_{ranks}"
+        done = cairn("run", case, "--out", out, "--restart", one / f"checkpoint_{checkpoint:06}.h5", *sets(settings),
+                     ranks=ranks, timeout=300)
+        if done.code != 0:
+            return [*failures, f"restart in growth: exit code {done.code}: {done.err}"]
+        for name in ("particles_000006.vtkhdf", "cracks_000006.h5"):
+            failures += [f"restart in growth: {name}: {line}" for line in compare_runs.compare_files(one / name, out / name)]
+    return failures
 
 
 def check_same_bits(cairn: Program, case: Path, scratch: Path) -> list[str]:
@@ -118,6 +189,8 @@ def main() -> int:
     case.write_text(plain + CRACKS)
     failures = check_same_bits(cairn, case, scratch)
     failures = failures or check_restart(cairn, case, scratch)
+    case.write_text(plain + GROWING)
+    failures += check_growth(cairn, case, scratch)
     failures += check_errors(cairn, plain, scratch)
     for failure in failures:
         print(failure)

@@ -1,6 +1,7 @@
 #pragma once
 /// Explicit cracks as patches hold them: a polyline of crack points (Nairn 2013; docs/cracks.md). 2D.
 
+#include <array>
 #include <cstdint>
 #include <tuple>
 
@@ -8,19 +9,36 @@
 
 namespace cairn {
 
+/// The history of the law between a crack's faces at a point (crack/traction.hpp).
+struct Bond {
+  enum State : std::int32_t { none, holds, broken };
+  State state = none;
+  double length = 0;                   // of the crack that the point stands for [m]
+  std::array<double, 2> peak = {0, 0}; // largest opening and slip so far [m]
+  double dissipated = 0;               // where it is broken [J/m2]
+};
+
 /// A point of a crack. The plane lies between the two faces, which begin in one place and move with the material on
 /// their sides. Upper is left of the crack's direction, that of ascending index.
 template <int Dim>
 struct CrackPoint {
+  static constexpr std::int32_t index_step = 1024;  // between neighbours at the start: room for those that come between
+
   std::int32_t crack = 0, index = 0;  // index along the crack, kept for life
+  std::int32_t next = 0;              // index of the point that follows; its own at the last one
   bool own = true;                    // of the patch that holds it; else a copy of a neighbour's
   bool filled = true;                 // material lay beside it in the last step
+  int faces_filled = 3;               // and beside which face: 1 below, 2 above
   Image image{};                      // crossings of periodic boundaries since the start
   Vec<Dim> plane = Vec<Dim>::Zero();  // [m]
   Vec<Dim> lower = Vec<Dim>::Zero();  // face below [m]
   Vec<Dim> upper = Vec<Dim>::Zero();  // face above [m]
   Vec<Dim> lower_velocity = Vec<Dim>::Zero(), upper_velocity = Vec<Dim>::Zero();  // in the last step [m/s]
 
+  Bond bond;                          // what its faces do to each other
+  Vec<Dim> traction = Vec<Dim>::Zero();  // on the lower face, that on the upper is its opposite [Pa]
+
+  static constexpr int filled_bit(int side) { return side > 0 ? 2 : 1; }
   Vec<Dim> opening() const { return upper - lower; }                         // [m]
   const Vec<Dim>& face(int side) const { return side > 0 ? upper : lower; }  // 1 above, -1 below
   Vec<Dim>& velocity(int side) { return side > 0 ? upper_velocity : lower_velocity; }
@@ -35,7 +53,7 @@ struct CrackPoint {
     return std::tie(a.crack, a.image, a.index) < std::tie(b.crack, b.image, b.index);
   }
   /// Whether b comes next on the same line.
-  bool precedes(const CrackPoint& b) const { return crack == b.crack && image == b.image && index + 1 == b.index; }
+  bool precedes(const CrackPoint& b) const { return crack == b.crack && image == b.image && next == b.index && index != next; }
 };
 
 /// The cracks that the straight line from a point to a node crosses, at most three, as one number that orders them.

@@ -22,10 +22,12 @@ struct PairLaw {
 
 /// What contact needs to know of a crack.
 struct CrackContact {
+  enum class Tie { none, normal, slip };
   bool meets = true;        // its faces keep each other out, or stick
   PairLaw law;              // between the faces
   bool all_bodies = true;   // cuts every body that is not rigid
   std::vector<int> bodies;  // else those that it cuts, ascending
+  Tie tie = Tie::none;      // what its faces share besides: the velocity along the normal, or across it
   bool cuts_body(int body) const { return all_bodies || std::binary_search(bodies.begin(), bodies.end(), body); }
 };
 

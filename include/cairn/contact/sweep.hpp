@@ -37,6 +37,7 @@ struct NodePair {
   int a = 0, b = none;  // entries, counted from the node's first; b is none for walls (and for all with own normals)
   int face = none;      // of a wall
   int crack = none;     // across a crack, from below to above
+  CrackContact::Tie tie = CrackContact::Tie::none;  // binds in that direction alone
   PairLaw law;
   Vec<Dim> normal = Vec<Dim>::Zero();  // out of a
   bool open = false;                   // contact is possible (not: too little mass there, no normal, a fixed face)
@@ -65,6 +66,16 @@ class ContactSweep {
                    bool last);
   /// On momenta projected again (NodeBox::velocity, before division by mass); closes the ledger.
   void repeat_pass(Patch<Dim>& patch, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings, double dt);
+
+  /// Calls f(place, crack, force) for the forces [N] that contact put on the upper sides of cracks in the last second
+  /// pass, at the nodes that the patch answers for.
+  template <class F>
+  void for_forces_across(double dt, F&& f) const {
+    for (const Node& node : nodes_)
+      for (int p = node.first_pair; node.share > 0 && p < node.first_pair + node.pair_count; ++p)
+        if (pairs_[p].crack != NodePair<Dim>::none)
+          f(node.place, pairs_[p].crack, Vec<Dim>(-node.share / dt * pairs_[p].second));
+  }
 
  private:
   struct Node {
@@ -121,6 +132,7 @@ class ContactSweep {
   void bring_to_rest(const Node& node);
   bool release_pairs(const Node& node);
   void add_friction(const Node& node);
+  std::vector<Vec<Dim>> bound_directions(const NodePair<Dim>& pair) const;
   void solve_as_published(const Node& node, const ContactSettings<Dim>& settings, double dt, Pass pass);
   void give(const NodePair<Dim>& pair, const Vec<Dim>& impulse);
   void take_back(const Node& node, double dt);

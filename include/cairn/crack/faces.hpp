@@ -1,6 +1,7 @@
 #pragma once
 /// How cracks move with the material: their faces see the rows on their side.
 
+#include "cairn/core/options.hpp"
 #include "cairn/crack/sides.hpp"
 
 namespace cairn {
@@ -28,11 +29,16 @@ struct CrackSurroundings {
   const CrackSegments<Dim>& segments;
   const std::vector<Crack>& cracks;
   const std::vector<double>& densities;  // of bodies; 0 for rigid ones, which no crack cuts [kg/m3]
+  StressUpdate update = StressUpdate::both;
 };
 
 /// \param side  1 above, -1 below
 template <int Dim>
 FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, int side);
+
+/// Share of a full body at x: 1 inside of the cut bodies, 1/2 at their surface.
+template <int Dim>
+double fill_at(const CrackSurroundings<Dim>& around, int crack, const Vec<Dim>& x);
 
 /// Velocity of a face that lies among a patch's nodes while its crack point is a neighbour's.
 template <int Dim>
@@ -42,12 +48,36 @@ struct FaceMotion {
   Vec<Dim> velocity;   // [m/s]
 };
 
-/// Gives the patch's own crack points the velocities of their faces, from NodeMotion's velocity, which moves the
-/// material as well. Of wide cracks a face may lie with a neighbour: returns what this patch knows of faces of others'
+/// Gives the patch's own crack points the velocities of their faces, from those that strains see in the step: forces do
+/// their work by them. With those that move the material instead, nodes' accelerations that no point sees would move the
+/// faces against their tractions, and make energy. Of wide cracks a face may lie with a neighbour: returns what this patch knows of faces of others'
 /// points.
 template <int Dim>
 std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,
                                                   const CrackSurroundings<Dim>& around);
+
+/// A force on the material of one row at a node, by a face of a crack point.
+template <int Dim>
+struct RowForce {
+  PatchId from;               // that found it
+  std::int32_t crack, index;  // of the crack point
+  int side;
+  Index<Dim> place;
+  SideSet sides;
+  Vec<Dim> force;  // [N]
+};
+
+/// The tractions of the crack points whose faces lie among the patch's nodes, as forces on rows; with complete masses.
+template <int Dim>
+std::vector<RowForce<Dim>> find_row_forces(const CrackSurroundings<Dim>& around);
+
+/// Puts forces in the order in which they are added. Of a face that several patches tell of, the first counts.
+template <int Dim>
+void sort_row_forces(std::vector<RowForce<Dim>>& forces);
+
+/// Adds those on the patch's nodes to the complete forces there; of several bodies each takes its share by mass.
+template <int Dim>
+void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, const std::vector<RowForce<Dim>>& forces);
 
 /// Own crack points that no material lies beside go with the nearest along the crack that it does.
 template <int Dim>

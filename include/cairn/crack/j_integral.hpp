@@ -34,6 +34,17 @@ struct TipSums {
   static constexpr int size = 4;
 };
 
+/// What a force on the upper face [N] adds, and its opposite on the lower one, within half of `width` [m] of x: with
+/// t on the upper face, I_m + int q (t . e_m) 4/(E' sqrt(2 pi r)) ds, e the normal for opening, ahead for sliding.
+TipSums face_terms(const CrackTip& tip, const Vec<2>& x, const Vec<2>& force, double width, double inner, double outer);
+
+/// The direction of the largest hoop stress [rad] from the one ahead, and the stress intensity there (Erdogan & Sih, J.
+/// Basic Eng. 85, 1963).
+struct HoopStress {
+  double angle, intensity;
+};
+HoopStress largest_hoop_stress(double K_opening, double K_sliding);
+
 /// What a point adds. \param inner, outer  radii between which q falls [m]
 TipSums tip_terms(const CrackTip& tip, const TipPoint& point, double inner, double outer);
 

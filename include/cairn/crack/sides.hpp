@@ -10,10 +10,29 @@ namespace cairn {
 /// What every rank knows of a crack.
 struct Crack {
   std::array<int, 2> ends = {0, 0};         // indices of its first and last point
-  std::array<bool, 2> open = {true, true};  // the first and last end: at or beyond a body's surface
+  std::array<bool, 2> open = {true, true};  // the first and last end: at or beyond a body's surface, or joined
+  std::array<bool, 2> joined = {false, false};  // to another crack that it ran into
+  std::array<double, 2> grown = {0, 0};         // lengths by which the ends grew [m]
+  std::array<double, 2> since = {-1, -1};       // when steady growth began [s]; -1: not yet
   bool all_bodies = true;                   // cuts every body that is not rigid
-  std::vector<int> bodies;                  // else those that it cuts, ascending
-  bool cuts(int body) const { return all_bodies || std::binary_search(bodies.begin(), bodies.end(), body); }
+  std::vector<int> bodies;                  // else those that it cuts
+  static constexpr int state_size = 10;  // what changes in a run
+  void state_of(double* to) const {
+    for (const int e : {0, 1}) *to++ = ends[e], *to++ = open[e], *to++ = joined[e], *to++ = grown[e], *to++ = since[e];
+  }
+  void restore(const double* from) {
+    for (const int e : {0, 1}) {
+      ends[e] = static_cast<int>(*from++), open[e] = *from++ != 0, joined[e] = *from++ != 0;
+      grown[e] = *from++, since[e] = *from++;
+    }
+  }
+  bool is_tip(int index) const { return (index == ends[0] && !open[0]) || (index == ends[1] && !open[1]); }
+  std::vector<int> spared;  // bodies that it parted and does not cut any more
+  bool idle = false;        // it cuts no body any more
+  bool cuts(int body) const {
+    return (all_bodies || std::ranges::find(bodies, body) != bodies.end()) &&
+           std::ranges::find(spared, body) == spared.end();
+  }
 };
 
 /// The segments of cracks within reach of a patch, by the cells they can matter to.
@@ -42,6 +61,9 @@ class CrackSegments {
   /// What the line from x, a point of the body, to a node crosses, of the segments listed.
   Crossings crossed(std::span<const int> near, const Vec<Dim>& x, const Vec<Dim>& node, int body,
                     const std::vector<Crack>& cracks) const;
+  /// How far along the line from x to y it meets a segment of another crack, or one of its own that is not among the
+  /// last `skipped` before x; as a share of the line, infinite where it meets none.
+  double first_meeting(const Vec<Dim>& x, const Vec<Dim>& y, int crack, double skipped) const;
   /// The unit normal of crack c nearest to x; zero where it has no segment here.
   Vec<Dim> normal_near(int c, const Vec<Dim>& x) const;
 

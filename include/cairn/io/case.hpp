@@ -85,7 +85,7 @@ struct Schedule {
 };
 
 struct Output {
-  Schedule particles, grains, contacts, forces, history, checkpoint;
+  Schedule particles, grains, contacts, forces, tips, history, checkpoint;
   std::vector<int> track;  // bodies of bodies.csv
 };
 

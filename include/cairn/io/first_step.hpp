@@ -14,4 +14,7 @@ struct FirstStep {
 
 FirstStep first_step(const Case& c);
 
+/// The longest step [s] for which interfaces and cohesive laws of cracks are stable; infinite where there are none.
+double longest_traction_step(const Case& c);
+
 }  // namespace cairn

@@ -95,7 +95,9 @@ class MaximumReduction {
 /// Messages between two ranks stay in order, so exchanges need no tags of their own.
 class NeighbourExchange {
  public:
-  NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours);  // neighbours: ascending, without the rank itself
+  /// \param neighbours  ascending, without the rank itself
+  /// \param channel     exchanges of several objects may be under way at a time on channels of their own
+  NeighbourExchange(MPI_Comm comm, std::vector<int> neighbours, int channel = 0);
   ~NeighbourExchange();
   NeighbourExchange(const NeighbourExchange&) = delete;
   NeighbourExchange& operator=(const NeighbourExchange&) = delete;
@@ -123,7 +125,7 @@ class NeighbourExchange {
   std::size_t slot(int rank) const;
 
   MPI_Comm comm_;
-  int rank_ = 0;
+  int rank_ = 0, tag_;
   std::vector<int> neighbours_;
   std::vector<Message> outgoing_, incoming_;  // by neighbour, and this rank's own at the end
   std::vector<MPI_Request> requests_;

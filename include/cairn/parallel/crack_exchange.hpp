@@ -27,6 +27,12 @@ void exchange_face_velocities(NeighbourExchange& messages, const PatchTable<Dim>
                               std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice,
                               const std::vector<std::vector<FaceMotion<Dim>>>& told);
 
+/// Gives every patch the forces that neighbours' crack points put on its nodes, beside its own, in the order in which
+/// they are added; `forces` for each patch. Collective.
+template <int Dim>
+void exchange_row_forces(NeighbourExchange& messages, const PatchTable<Dim>& table, const std::vector<Patch<Dim>>& patches,
+                         const Lattice<Dim>& lattice, std::vector<std::vector<RowForce<Dim>>>& forces);
+
 /// Puts a crack point into a message, and takes it from there.
 template <int Dim>
 void put_crack_point(const CrackPoint<Dim>& point, Message& message);

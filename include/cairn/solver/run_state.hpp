@@ -14,14 +14,17 @@ namespace cairn {
 
 struct RunState {
   StepState step;
-  ClockState particles, grains, contacts, forces, history, checkpoint;
+  ClockState particles, grains, contacts, forces, tips, history, checkpoint;
   EnergyBookState energy;
   double contacts_cleared = 0;     // time since which contacts are summed [s]
   std::int64_t contacts_kept = 0;  // 1 where they are summed at all
   double wall = 0;                 // of the run so far [s]; 0 unless an output depends on it
-  CsvPosition history_file, bodies_file, forces_file;
+  CsvPosition history_file, bodies_file, forces_file, tips_file;
   std::uint64_t bodies = 0;                // bodies_checksum of the case
   std::vector<SeriesIndex::Entry> series;  // of the particle files
+  std::vector<double> cracks;              // Crack::state_size numbers for each
+  std::vector<double> parts;               // bodies from which further ones were split off, in their order
+  std::vector<double> spared;              // pairs of a crack and a body that it does not cut any more
   std::vector<double> tools;               // tool_state_size numbers for each: travel, velocity, spin, speed
 };
 
@@ -35,7 +38,7 @@ void for_each_number(State& s, F&& f) {
     f(name + "_last_wall", c.last_wall), f(name + "_count", c.count);
   };
   clock("particles", s.particles), clock("grains", s.grains), clock("contacts", s.contacts), clock("forces", s.forces);
-  clock("history", s.history), clock("checkpoint", s.checkpoint);
+  clock("tips", s.tips), clock("history", s.history), clock("checkpoint", s.checkpoint);
   f("energy_started", s.energy.started), f("energy_initial", s.energy.initial);
   f("energy_initial_potential", s.energy.initial_potential), f("energy_largest", s.energy.largest);
   f("energy_error", s.energy.error);
@@ -43,6 +46,7 @@ void for_each_number(State& s, F&& f) {
   f("history_bytes", s.history_file.bytes), f("history_checksum", s.history_file.checksum);
   f("bodies_bytes", s.bodies_file.bytes), f("bodies_checksum", s.bodies_file.checksum);
   f("forces_bytes", s.forces_file.bytes), f("forces_checksum", s.forces_file.checksum);
+  f("tips_bytes", s.tips_file.bytes), f("tips_checksum", s.tips_file.checksum);
   f("case_bodies", s.bodies);
 }
 

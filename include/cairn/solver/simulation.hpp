@@ -9,6 +9,7 @@
 #include "cairn/contact/sweep.hpp"
 #include "cairn/crack/faces.hpp"
 #include "cairn/crack/j_integral.hpp"
+#include "cairn/crack/traction.hpp"
 #include "cairn/io/case.hpp"
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/parallel/migration.hpp"
@@ -33,12 +34,13 @@ struct SolverMaterial {
 struct Totals : PatchLedger {
   double kinetic = 0, strain = 0, potential = 0, plastic = 0;  // [J]; rigid bodies are left out
   double viscous = 0;                                          // [J], dissipated in the material; likewise
+  double crack_energy = 0, crack_dissipation = 0;              // [J], stored and taken by laws between faces of cracks
   double numerical = 0;                                        // [J], lost by blending with PIC and in spins
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0, deformable_mass = 0;                        // [kg]
   double energy() const {
-    return kinetic + strain + potential + plastic + viscous + contact_dissipation + numerical + filtered + energy_left -
-           boundary_work;
+    return kinetic + strain + potential + plastic + viscous + crack_energy + crack_dissipation + contact_dissipation +
+           numerical + filtered + energy_left - boundary_work;
   }
 };
 
@@ -60,6 +62,7 @@ struct TipState {
   CrackTip tip;
   double J = 0, J_static = 0;           // with the terms of motion, and without [J/m2]
   double K_opening = 0, K_sliding = 0;  // [Pa m^1/2]; NaN where the law is not linear
+  double length = 0;                    // by which it grew [m]
 };
 
 class Checkpoint;
@@ -108,6 +111,8 @@ class Simulation {
     return patches_;
   }
   const std::vector<Crack>& cracks() const { return cracks_; }
+  /// Energy stored and dissipated by the law between the faces at a crack point [J].
+  std::array<double, 2> energies_of(const CrackPoint<Dim>& point) const;
   const std::vector<Tool>& tools() const { return tools_; }
   /// Of faces those that hold something are tools.
   bool has_tool(int tool) const {
@@ -118,6 +123,11 @@ class Simulation {
   /// What bodies did to every tool so far and in the last step, summed in patch order; kept only where the case writes
   /// forces. Collective; the result is valid on rank 0.
   std::vector<ToolSum> tool_sums() const;
+  /// What changes in a run of what every rank knows of cracks, Crack::state_size numbers for each.
+  std::vector<double> crack_states() const;
+  /// Bodies from which further ones were split off, in their order, and pairs of a crack and a body that it parted.
+  const std::vector<double>& parts() const { return parts_; }
+  std::vector<double> spared() const;
   /// Their states, tool_state_size numbers for each.
   std::vector<double> tool_states() const;
   const PatchTable<Dim>& table() const { return table_; }
@@ -165,6 +175,7 @@ class Simulation {
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
   void finish_points(Patch<Dim>& patch, double share);
   void receive_points();  // communicates
+  void exchange_tractions();  // communicates, where faces of cracks pull each other; before complete_forces
   void move_cracks();     // communicates, where there are any
   void receive_cracks();  // likewise
 
@@ -244,15 +255,34 @@ class Simulation {
   void for_crack_points(const Case& c, F&& f) const;
   std::vector<PatchId> patches_of_cracks(const Case& c) const;  // that hold a point of a crack
   void place_cracks(const Case& c);
+  void restore_cracks(const std::vector<double>& states);
   void find_cracks(Patch<Dim>& patch);  // their segments, where they are now
   void check_points_on_cracks(const Case& c);
+  // solver/tractions.cpp
+  void define_tractions(const Case& c);
+  void bind_faces(const Case& c);
+  void find_tractions(std::size_t p);
+  // solver/split.cpp
+  void split_bodies();
+  int add_part(int of);
+  void spare_parted(const std::vector<int>& bodies);
+  void tell_contact_of_cracks();
+  void restore_parts(const std::vector<double>& parts, const std::vector<double>& spared);
+  // solver/growth.cpp
+  struct Advance;  // of a tip
+  void grow_cracks();
+  std::vector<Advance> find_advances();
+  void meet_obstacles(std::vector<Advance>& advances);
+  void advance(const Advance& to);
+  void follow_openings();
   // solver/tips.cpp
   std::vector<CrackTip> find_tips() const;
-  void find_motion();
+  double find_motion();
+  void add_face_terms(std::size_t p, const std::vector<CrackTip>& tips, double dt, std::vector<TipSums>& sums) const;
   void add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip>& tips, std::vector<TipSums>& sums) const;
   CrackSegments<Dim>& segments_of(const Patch<Dim>& patch) { return segments_[&patch - patches_.data()]; }
   CrackSurroundings<Dim> surroundings_of(const Patch<Dim>& patch) {
-    return {patch, lattice_, segments_of(patch), cracks_, crack_densities_};
+    return {patch, lattice_, segments_of(patch), cracks_, crack_densities_, solver_.stress_update};
   }
   void finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share);
   void turn_stress(Piece<Dim>& piece);
@@ -302,10 +332,16 @@ class Simulation {
   std::vector<Crack> cracks_;
   std::vector<CrackSegments<Dim>> segments_;                // for each patch
   std::vector<std::vector<FaceMotion<Dim>>> face_motions_;  // for each patch: of its neighbours' crack points
+  std::vector<std::optional<TractionLaw>> traction_laws_;   // for each crack; empty where none has one
+  std::vector<std::vector<RowForce<Dim>>> row_forces_;      // for each patch: of tractions
+  double traction_dt_ = std::numeric_limits<double>::infinity();  // longest step for which they are stable [s]
+  int split_every_ = 0;                                            // steps; 0: parts stay in their body
+  std::vector<double> parts_;                                      // bodies that those behind the case's came from
+  std::vector<GrowthSpec> growth_;                                 // of each crack
   std::vector<Material> specs_;                             // of materials, where there are cracks
   std::array<double, 2> j_radius_{};                        // [cells]
   std::vector<double> crack_densities_;                     // of bodies; 0 for rigid ones [kg/m3]
-  std::unique_ptr<NeighbourExchange> messages_;
+  std::unique_ptr<NeighbourExchange> messages_, traction_messages_;
   std::unique_ptr<NodeExchange<Dim>> exchange_;
   std::unique_ptr<Migration<Dim>> migration_;
   ArrayPool velocities_, motions_;  // of nodes, where nothing is projected again

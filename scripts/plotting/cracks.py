@@ -1,0 +1,83 @@
+"""Pictures of cracks: their faces over the bodies, and what drives their tips over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import matplotlib.pyplot as plt
+import numpy as np
+
+import figures
+from results import Frame, MissingData, Run, reading
+
+
+def faces(run: Run, frame: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Lower and upper face (each N x 2) [m] of every crack at the time of a frame, cut where it leaves the domain."""
+    path = frame.path.parent / f"{frame.path.stem.replace('particles', 'cracks')}.h5"
+    if not path.exists():
+        raise MissingData(f"there is no {path.name}: the case has no cracks")
+    with reading(path), h5py.File(path, "r") as file:
+        crack, index, image = file["crack"][()], file["index"][()], file["image"][()]
+        lower, upper = file["lower"][()][:, :2], file["upper"][()][:, :2]
+    lines = []
+    order = np.lexsort((index, image[:, 1], image[:, 0], crack))
+    key = np.column_stack([crack, image[:, :2]])[order]
+    starts = np.flatnonzero(np.any(key[1:] != key[:-1], axis=1)) + 1
+    for part in np.split(order, starts):
+        lines.append((lower[part], upper[part]))
+    return lines
+
+
+def draw_faces(axes, run: Run, frame: Frame) -> None:
+    """Both faces of every crack, and what lies between them, as lines over a picture of the domain."""
+    factor, _ = figures.length_unit(run)
+    for lower, upper in faces(run, frame):
+        for face in (lower, upper):
+            axes.plot(*(factor * face.T), color="red", lw=0.8)
+
+
+def cracks(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
+    """The faces of the cracks over the bodies, at the start and at the end."""
+    if run.dimension != 2:
+        raise MissingData("drawn for two dimensions only")
+    if not run.frames:
+        raise MissingData("there are no particles_*.vtkhdf files (see output.particles)")
+    frames = [run.frames[0], run.frames[-1]]
+    figure, row = plt.subplots(1, 2, figsize=(14, 7))
+    for axes, frame in zip(row, frames):
+        faces(run, frame)
+        figures._show(axes, run, *figures.grain_picture(run, frame), f"{run.title}, {figures.label(run, frame)}")
+        draw_faces(axes, run, frame)
+        for d, limits in enumerate((axes.set_xlim, axes.set_ylim)):
+            limits(figures.length_unit(run)[0] * run.lower[d], figures.length_unit(run)[0] * run.upper[d])
+    return [figures._save(figure, folder, "cracks.png")]
+
+
+def tips(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
+    """J, K and the growth of the tips over time, from tips.csv."""
+    path = run.folder / "tips.csv"
+    if not path.exists():
+        raise MissingData("there is no tips.csv (see output.tips)")
+    with reading(path), open(path, encoding="utf-8") as file:
+        names = file.readline().strip().split(",")
+        rows = np.loadtxt(file, delimiter=",", ndmin=2)
+    if rows.size == 0:
+        raise MissingData("tips.csv has no rows")
+    table = dict(zip(names, rows.T))
+    panels = (("J", "J [J/m²]"), ("K_I", "K_I [Pa m$^{1/2}$]"), ("K_II", "K_II [Pa m$^{1/2}$]"), ("grown", "growth [m]"))
+    figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True)
+    tips_of_run = sorted(set(zip(table["crack"], table["end"])))
+    for panel, (name, title) in zip(axes.flat, panels):
+        for crack, end in tips_of_run:
+            rows_of_tip = (table["crack"] == crack) & (table["end"] == end)
+            panel.plot(table["time"][rows_of_tip], table[name][rows_of_tip], lw=1,
+                       label=f"crack {crack:.0f}, {'last' if end else 'first'} end")
+        panel.set_ylabel(title)
+    for panel in axes[1]:
+        panel.set_xlabel("time [s]")
+    if len(tips_of_run) <= 8:
+        axes[0, 0].legend(fontsize=8)
+    figure.suptitle(run.title, fontsize=10)
+    summary["grown_at_end_m"] = float(sum(table["grown"][table["time"] == table["time"].max()]))
+    return [figures._save(figure, folder, "tips.png")]
