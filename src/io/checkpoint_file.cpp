@@ -12,7 +12,7 @@ namespace cairn {
 namespace {
 
 constexpr const char* checkpoint_kind = "checkpoint";
-constexpr std::int64_t format_version = 5;
+constexpr std::int64_t format_version = 6;
 
 }  // namespace
 

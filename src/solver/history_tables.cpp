@@ -24,6 +24,7 @@ std::vector<std::string> history_columns(int dimension) {
                              "filter_dissipation", "contact_gain", "points_stopped", "points_left", "points_lost",
                              "mass_left", "energy_left", "momentum_left_x", "momentum_left_y"});
   if (dimension == 3) names.emplace_back("momentum_left_z");
+  names.insert(names.end(), {"damping_dissipation", "unbalanced_force", "largest_unbalanced_force"});
   return names;
 }
 
@@ -77,6 +78,7 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   row.emplace_back(static_cast<std::int64_t>(t.points_lost));
   for (const double left : {t.mass_left, t.energy_left, t.momentum_left_x, t.momentum_left_y}) row.emplace_back(left);
   if (Dim == 3) row.emplace_back(t.momentum_left_z);
+  row.insert(row.end(), {t.damped, simulation.force_balance().mean(), simulation.force_balance().largest()});
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

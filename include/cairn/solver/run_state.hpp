@@ -22,6 +22,8 @@ struct RunState {
   CsvPosition history_file, bodies_file, forces_file;
   std::uint64_t bodies = 0;                // bodies_checksum of the case
   std::vector<SeriesIndex::Entry> series;  // of the particle files
+  std::vector<double> stage;               // of the StageKeeper
+  std::vector<double> pouring;             // of the simulation
   std::vector<double> tools;               // tool_state_size numbers for each: travel, velocity, spin, speed
 };
 
@@ -29,6 +31,7 @@ struct RunState {
 /// first.
 template <class State, class F>
 void for_each_number(State& s, F&& f) {
+  f("kinetic", s.step.kinetic[0]), f("kinetic_before", s.step.kinetic[1]);
   f("dt", s.step.dt), f("wave_speed", s.step.wave_speed), f("point_speed", s.step.point_speed);
   const auto clock = [&](const std::string& name, auto& c) {
     f(name + "_last_step", c.last_step), f(name + "_last_time", c.last_time);
