@@ -41,6 +41,12 @@ if(NOT METIS_INCLUDE_DIR OR NOT METIS_LIBRARY)
   cairn_missing("METIS 5 (Debian: libmetis-dev)")
 endif()
 
+find_path(MUPARSER_INCLUDE_DIR muParser.h)
+find_library(MUPARSER_LIBRARY muparser)
+if(NOT MUPARSER_INCLUDE_DIR OR NOT MUPARSER_LIBRARY)
+  cairn_missing("muparser 2 (Debian: libmuparser-dev)")
+endif()
+
 # The name of the MPI library that a shared library asks for, or that it has itself; empty for a static library.
 function(cairn_mpi_of library tag result)
   set(${result} "" PARENT_SCOPE)

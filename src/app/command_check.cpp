@@ -145,6 +145,7 @@ void print_summary(const Case& c) {
   const double steps = std::min(std::ceil(c.time.end / first.dt * (1 - 1e-9)), static_cast<double>(c.time.steps));
   fmt::print("  first step {:.4g} s ({:.2g} of what a wave and a point take through a cell)\n", first.dt,
              first.dt / first.crossing);
+  if (c.time.steps == Time{}.steps && !std::isfinite(c.time.end)) return;
   fmt::print("  steps      {:.0f}{}\n", steps, c.time.dt > 0 ? "" : ", if steps stay as long");
 }
 

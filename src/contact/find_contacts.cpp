@@ -23,10 +23,15 @@ Vec<Dim> outward(int face) {
 }
 
 template <int Dim>
-bool at_face_of_type(FaceType type, const Index<Dim>& place, const Lattice<Dim>& lattice,
-                     const ContactSettings<Dim>& settings) {
+bool at_fixed_face(const Index<Dim>& place, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings) {
   for (int face = 0; face < 2 * Dim; ++face)
-    if (settings.faces[face].type == type && at_face<Dim>(place, face, lattice)) return true;
+    if (settings.faces[face].type == FaceType::fixed && at_face<Dim>(place, face, lattice)) return true;
+  return false;
+}
+template <int Dim>
+bool at_any_wall(const Index<Dim>& place, const Lattice<Dim>& lattice, const ContactSettings<Dim>& settings) {
+  for (int face = 0; face < 2 * Dim; ++face)
+    if (at_wall<Dim>(place, face, settings.faces, lattice)) return true;
   return false;
 }
 
@@ -68,14 +73,13 @@ void ContactSweep<Dim>::list_nodes(const Patch<Dim>& patch, const Lattice<Dim>& 
   nodes_.clear();
   bool walled = false;
   for (int face = 0; face < 2 * Dim; ++face)
-    walled = walled || (settings.faces[face].type == FaceType::wall &&
-                        at_face<Dim>(face % 2 == 0 ? box_.lower : box_.upper, face, lattice));
+    walled = walled || at_wall<Dim>(face % 2 == 0 ? box_.lower : box_.upper, face, settings.faces, lattice);
   int total = 0, at = 0;
   for_each(box_, [&](const Index<Dim>& i) {
     std::int32_t& slot = bodies_at_[at++];
     const int count = slot;
     slot = -1;
-    if (count < 2 && !(count == 1 && walled && at_face_of_type<Dim>(FaceType::wall, i, lattice, settings))) return;
+    if (count < 2 && !(count == 1 && walled && at_any_wall<Dim>(i, lattice, settings))) return;
     slot = static_cast<std::int32_t>(nodes_.size());
     nodes_.push_back({total, count, 0, 0, 0, i, node_share<Dim>(patch.id, i, lattice, settings.faces)});
     total += count;
@@ -116,7 +120,7 @@ void ContactSweep<Dim>::list_pairs(Node& node, const Patch<Dim>& patch, const La
                                    const ContactSettings<Dim>& settings) {
   const ContactEntry<Dim>* entry = &entries_[node.first];
   const bool own = settings.options.normal_choice == NormalChoice::own;
-  const bool fixed = at_face_of_type<Dim>(FaceType::fixed, node.place, lattice, settings);
+  const bool fixed = at_fixed_face<Dim>(node.place, lattice, settings);
   if (has_sides(node)) {
     node.first_pair = static_cast<int>(pairs_.size());
     list_sided_pairs(node, patch, lattice, settings, fixed);
@@ -164,10 +168,9 @@ void ContactSweep<Dim>::add_wall_pairs(const Node& node, const Patch<Dim>& patch
   using N = NodeSums<Dim>;
   for (int face = 0; face < 2 * Dim; ++face) {
     const auto& wall = settings.faces[face];
-    if (wall.type != FaceType::wall || !at_face<Dim>(node.place, face, lattice)) continue;
-    Index<Dim> on_wall = node.place;
-    for (int d = 0; d < Dim; ++d)
-      if (!lattice.periodic(d)) on_wall[d] = std::clamp(on_wall[d], 0, lattice.cells()[d]);
+    if (!at_wall<Dim>(node.place, face, settings.faces, lattice)) continue;
+    const Index<Dim> on_wall = settings.node_at_walls(node.place, lattice);
+    const double to_plane = wall.moves ? cells_to_plane<Dim>(on_wall, face, wall, lattice) : 0.0;
     for (int i = 0; i < node.count; ++i) {
       const auto& entry = entries_[node.first + i];
       if (entry.rigid) continue;
@@ -180,10 +183,11 @@ void ContactSweep<Dim>::add_wall_pairs(const Node& node, const Patch<Dim>& patch
       const double* sums = whole.data();
       if (!(sums[N::mass] > 0)) continue;
       pair.open = true;
-      // A wall leaves a body half of a node's room: twice that is the room of which contact/gap.hpp speaks. What lies
-      // beyond the wall has a gradient that points back in: its size would read as a gap on this side.
+      // The room of which contact/gap.hpp speaks is that without the wall. What lies beyond the wall has a gradient that
+      // points back in: its size would read as a gap on this side.
       const bool beyond = pair.normal.dot(ConstNode<Dim>(sums + N::gradient)) < 0;
-      pair.gap = beyond ? 0.0 : settings.distance(sums, pair.normal, lattice, 2 * settings.room(on_wall, lattice));
+      const double room = settings.room(on_wall, lattice, face);
+      pair.gap = beyond ? 0.0 : settings.distance(sums, pair.normal, lattice, room) + to_plane;
       pair.yield = contact::TouchingGap::yield(lattice.smallest_spacing(),
                                                settings.materials[entry.material].wave_speed, sums[N::mass]);
       pairs_.push_back(pair);

@@ -22,14 +22,41 @@ ContactSettings<Dim> ContactSettings<Dim>::make(const ContactOptions& options, s
   return s;
 }
 
+namespace {
+
+/// The share of a hat that lies in front of a plane, s cells off its node.
+double share_in_front(double s) {
+  constexpr double least = 0.05;
+  if (s >= 1) return 1;
+  return s >= 0 ? 1 - 0.5 * (1 - s) * (1 - s) : std::max(least, 0.5 * (1 + s) * std::max(0.0, 1 + s));
+}
+
+}  // namespace
+
 template <int Dim>
-double ContactSettings<Dim>::room(const Index<Dim>& place, const Lattice<Dim>& lattice) const {
+double ContactSettings<Dim>::room(const Index<Dim>& place, const Lattice<Dim>& lattice, int but_for) const {
   double room = lattice.cell_volume();
   for (int face = 0; face < 2 * Dim; ++face) {
+    if (face == but_for) continue;
     const FaceType type = faces[face].type;
-    if ((type == FaceType::fixed || type == FaceType::wall) && at_face<Dim>(place, face, lattice)) room *= 0.5;
+    if (type == FaceType::wall && faces[face].moves)
+      room *= share_in_front(cells_to_plane<Dim>(place, face, faces[face], lattice));
+    else if ((type == FaceType::fixed || type == FaceType::wall) && at_face<Dim>(place, face, lattice))
+      room *= 0.5;
   }
   return room;
+}
+
+template <int Dim>
+Index<Dim> ContactSettings<Dim>::node_at_walls(Index<Dim> place, const Lattice<Dim>& lattice) const {
+  for (int d = 0; d < Dim; ++d) {
+    if (lattice.periodic(d)) continue;
+    const auto &low = faces[2 * d], &high = faces[2 * d + 1];
+    const int first = low.moves ? static_cast<int>(std::floor(lattice.scaled(d, low.plane))) : 0;
+    const int last = high.moves ? static_cast<int>(std::ceil(lattice.scaled(d, high.plane))) : lattice.cells()[d];
+    place[d] = std::max(first, std::min(place[d], last));
+  }
+  return place;
 }
 
 template <int Dim>

@@ -74,7 +74,12 @@ void ContactSweep<Dim>::second_pass(Patch<Dim>& patch, const Lattice<Dim>& latti
       touched = touched || !impulses_[i].isZero(0);
     }
     patch.ledger.contact_nodes += touched && node.share > 0;
-    if (node.share > 0 && settings.keep_contacts) keep_contacts(node, patch, lattice);
+    for (int p = node.first_pair; p < node.first_pair + node.pair_count; ++p) {
+      const NodePair<Dim>& pair = pairs_[p];
+      const bool both = pair.b != pair.none && !entries_[node.first + pair.b].rigid;
+      patch.pressing += node.share / dt * (both ? 2 : 1) * pair.second.norm();
+    }
+    if (node.share > 0 && settings.keep_contacts) keep_contacts(node, patch, lattice, settings, dt);
     if (node.share > 0 && settings.keep_tools) keep_tools(node, patch, lattice);
     if (last) keep_ledger(node, patch, dt, false);
   }
@@ -106,21 +111,31 @@ void ContactSweep<Dim>::keep_ledger(const Node& node, Patch<Dim>& patch, double 
 }
 
 template <int Dim>
-void ContactSweep<Dim>::keep_contacts(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const {
+void ContactSweep<Dim>::keep_contacts(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                                      const ContactSettings<Dim>& settings, double dt) const {
+  using S = ContactSum<Dim>;
   const auto body_of = [&](int i) { return patch.pieces[entries_[node.first + i].piece].body; };
   for (int p = node.first_pair; p < node.first_pair + node.pair_count; ++p) {
     const NodePair<Dim>& pair = pairs_[p];
+    const bool wall = pair.face != pair.none;
     const double size = node.share * pair.second.norm();
-    if (pair.face != pair.none || pair.crack != pair.none || pair.a == node.partner || !(size > 0)) continue;
-    const int body = body_of(pair.a), other = body_of(node.partner);
+    if (pair.crack != pair.none || (!wall && pair.a == node.partner) || !(size > 0)) continue;
+    const int body = body_of(pair.a), other = wall ? settings.bodies + pair.face : body_of(node.partner);
     const double sign = body < other ? 1.0 : -1.0;  // impulse on the lower body, normal towards the higher
+    Vec<Dim> sliding = Vec<Dim>::Zero();
+    if (wall || pair.b != pair.none) sliding = contact::tangential<Dim>(relative_velocity(node, pair), pair.normal);
     double* sum = patch.contacts[std::minmax(body, other)].values.data();
     sum[0] += size;
     for (int d = 0; d < Dim; ++d) {
-      sum[1 + d] += sign * node.share * pair.second[d];
-      sum[1 + Dim + d] += size * lattice.node_position(d, node.place[d]);
-      sum[1 + 2 * Dim + d] += sign * size * pair.normal[d];
+      const double impulse = sign * node.share * pair.second[d];
+      sum[S::impulse + d] += impulse;
+      sum[S::place + d] += size * lattice.node_position(d, node.place[d]);
+      sum[S::normal + d] += sign * size * pair.normal[d];
+      for (int j = 0; j < Dim; ++j) sum[S::moment + d * Dim + j] += impulse * lattice.node_position(j, node.place[j]);
     }
+    sum[S::slip] += size * dt * sliding.norm();
+    sum[S::friction] -= node.share * pair.second.dot(sliding);
+    if (pair.law.binds() || pair.decision.stick) sum[S::stuck] += size;
   }
 }
 

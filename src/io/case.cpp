@@ -18,24 +18,28 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   const std::size_t before = errors.count();
   read_domain(root.table("domain"), c.domain);
   draft.domain_known = errors.count() == before;
-  read_time(root.table("time"), c.time);
+  read_time(root.table("time"), root.has("stage"), c.time);
   read_solver(root.table("solver"), c.domain.dimension, c.solver);
   read_materials(root.table("materials"), c.domain.dimension, c.materials);
   read_contact(root.table("contact"), c.materials, c.contact);
   read_bodies(root, draft, errors);
   read_grains(root, draft, errors);
-  if (!root.has("bodies") && !root.has("grains"))
+  read_pouring(root, draft, errors);
+  if (!root.has("bodies") && !root.has("grains") && !root.has("insert"))
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   read_drives(root, draft);
   read_cracks(root, draft);
   check_pressures(draft, errors);
-  read_boundary(root.table("boundary"), c.domain, c.faces);
+  read_boundary(root.table("boundary"), draft);
+  read_damping(root.table("damping"), c.solver.stress_update, c.damping);
   read_parallel(root.table("parallel"), c.parallel);
   read_output(root.table("output"), draft, c.output);
+  read_stages(tree, root, draft, errors);
   root.finish();
   if (errors.count() == 0 && c.bodies.empty())
     root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
   errors.throw_if_any();
+  check_walls(c, errors);
   check_points(c, errors);
   check_time_step(c, errors);
   errors.throw_if_any();

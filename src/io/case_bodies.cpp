@@ -1,4 +1,4 @@
-// [materials], [[bodies]], [[grains]] and [[drive]].
+// [materials], [[bodies]] and [[grains]].
 
 #include <fmt/format.h>
 
@@ -127,40 +127,6 @@ std::string add_table(std::vector<CaseTable>& tables, const std::filesystem::pat
   return tables.back().copy;
 }
 
-/// Reads one way of selecting bodies, from the drive itself or from its table `bodies`; adds how many were given.
-void read_selection(Table& table, const Draft& draft, Drive& drive, int& given) {
-  const auto& bodies = draft.result.bodies;
-  const Domain& domain = draft.result.domain;
-  if (table.has("ids")) {
-    ++given;
-    drive.ids = table.integers("ids");
-    check_ids(table, "ids", drive.ids, draft);
-  }
-  if (table.has("group")) {
-    ++given;
-    drive.group = table.text("group", std::nullopt);
-    const bool found = !drive.group.empty() && std::ranges::find(bodies, drive.group, &BodySpec::group) != bodies.end();
-    if (!found && draft.bodies_known)
-      table.error("group", fmt::format("{} is the group of no body; use a group given in [[bodies]] or [[grains]]",
-                                       in_quotes(drive.group)));
-  }
-  if (table.has("overlapping")) {
-    ++given;
-    drive.overlapping = table.choice("overlapping", face_index_names, -1);
-    drive.within = table.number("within", 0.0, not_negative);
-    if (drive.overlapping < 0) return;
-    const int k = drive.overlapping / 2;
-    const auto reaches = [&](const BodySpec& body) { return selects(drive, body, -1, domain); };
-    if (k >= domain.dimension) {
-      table.error("overlapping", "this face belongs to 3D; the case has dimension 2");
-    } else if (domain.periodic[k]) {
-      table.error("overlapping", fmt::format("direction {} is periodic and has no faces", "xyz"[k]));
-    } else if (draft.domain_known && draft.bodies_known && std::ranges::none_of(bodies, reaches)) {
-      table.error("overlapping", fmt::format("no body reaches across the face {}", face_names[drive.overlapping]));
-    }
-  }
-}
-
 }  // namespace
 
 void check_ids(Table& table, std::string_view key, const std::vector<int>& ids, const Draft& draft) {
@@ -218,91 +184,49 @@ void read_bodies(Table& root, Draft& draft, Errors& errors) {
   draft.shaped_bodies = draft.result.bodies.size();
 }
 
-void read_grains(Table& root, Draft& draft, Errors& errors) {
+GrainsSpec read_grains_spec(Table& table, Draft& draft) {
   const int dimension = draft.result.domain.dimension;
-  for (Table& table : root.tables("grains")) {
-    GrainsSpec spec;
-    const std::string name = table.text("file", std::nullopt);
-    spec.material = read_material_name(table, draft.result.materials, false);
-    spec.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
-    spec.angular_velocity = read_angular_velocity(table, dimension);
-    spec.initial_pressure = table.number("initial_pressure", 0.0);
-    spec.group = table.text("group", "");
-    table.finish();
-    const bool known = std::exchange(draft.bodies_known, false);  // until the table has been read
-    if (name.empty()) {
-      if (table.has("file") && table.find("file")->is_string()) table.error("file", "is empty; name a grain table");
-      continue;
-    }
-    const std::filesystem::path path = (draft.result.file.parent_path() / name).lexically_normal();
-    spec.file = std::filesystem::absolute(path).lexically_normal();
-    std::error_code status;
-    if (!std::filesystem::exists(path, status)) {
-      table.error("file", fmt::format("there is no file {}; the name is relative to the folder of the case file",
-                                      in_quotes(path.string())));
-      continue;
-    }
-    const std::size_t before = errors.count();
-    const std::uint64_t checksum = read_grain_table(path, spec, draft, errors);
-    draft.bodies_known = known && errors.count() == before;
-    spec.copy = add_table(draft.result.tables, spec.file, checksum);
-    draft.grains.push_back(std::move(spec));
+  GrainsSpec spec;
+  spec.material = read_material_name(table, draft.result.materials, false);
+  spec.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
+  spec.angular_velocity = read_angular_velocity(table, dimension);
+  spec.initial_pressure = table.number("initial_pressure", 0.0);
+  spec.group = table.text("group", "");
+  if (!table.has("file")) return spec;
+  const std::string name = table.text("file", std::nullopt);
+  if (name.empty()) {
+    if (table.find("file")->is_string()) table.error("file", "is empty; name a grain table");
+    draft.bodies_known = false;
+    return spec;
   }
+  const std::filesystem::path path = (draft.result.file.parent_path() / name).lexically_normal();
+  std::error_code status;
+  if (!std::filesystem::exists(path, status)) {
+    table.error("file", fmt::format("there is no file {}; the name is relative to the folder of the case file",
+                                    in_quotes(path.string())));
+    draft.bodies_known = false;
+    return spec;
+  }
+  spec.given = path, spec.file = std::filesystem::absolute(path).lexically_normal();
+  return spec;
 }
 
-namespace {
-
-/// Spin in 2D is one number.
-MotionTable read_spin(Table& table, int dimension) {
-  MotionTable spin = table.motion("angular_velocity", dimension == 3 ? 3 : 1);
-  if (dimension == 2)
-    for (Vec3& w : spin.values) w = Vec3(0, 0, w.x());
-  return spin;
+std::string read_table(const GrainsSpec& spec, Draft& draft, Errors& errors) {
+  const bool known = std::exchange(draft.bodies_known, false);  // until the table has been read
+  const std::size_t before = errors.count();
+  const std::uint64_t checksum = read_grain_table(spec.given, spec, draft, errors);
+  draft.bodies_known = known && errors.count() == before;
+  return add_table(draft.result.tables, spec.file, checksum);
 }
 
-void read_piston(Table table, int dimension, StressUpdate update, Piston& piston) {
-  if (!table.present()) return;
-  if (update != StressUpdate::both && update != StressUpdate::modified_last)
-    table.error("",
-                "needs solver.stress_update = \"both\" or \"modified_last\": with others the force of a step is known "
-                "too late");
-  piston.mass = table.number("mass", std::nullopt, positive);
-  piston.along = table.vector("along", dimension, std::nullopt);
-  if (piston.along == Vec3::Zero()) table.error("along", "has no direction; it must not be zero");
-  piston.along.normalize();
-  if (!table.has("force")) table.missing("force", "is missing; give a number [N], or rows of time and force");
-  piston.force = table.motion("force", 1);
-  piston.force.repeat = table.boolean("repeat", false);
-  table.finish();
-}
-
-void read_motion(Table& table, int dimension, StressUpdate update, Drive& drive) {
-  drive.velocity = table.motion("velocity", dimension);
-  drive.angular_velocity = read_spin(table, dimension);
-  const bool repeat = table.boolean("repeat", false);
-  drive.velocity.repeat = repeat && drive.velocity.varies();
-  drive.angular_velocity.repeat = repeat && drive.angular_velocity.varies();
-  read_piston(table.table("piston"), dimension, update, drive.piston);
-}
-
-}  // namespace
-
-void read_drives(Table& root, Draft& draft) {
-  for (Table& table : root.tables("drive")) {
-    Drive drive;
-    int given = 0;
-    if (Table bodies = table.table("bodies"); bodies.present()) {
-      read_selection(bodies, draft, drive, given);
-      bodies.finish();
-    }
-    read_selection(table, draft, drive, given);
-    read_motion(table, draft.result.domain.dimension, draft.result.solver.stress_update, drive);
+void read_grains(Table& root, Draft& draft, Errors& errors) {
+  for (Table& table : root.tables("grains")) {
+    GrainsSpec spec = read_grains_spec(table, draft);
+    if (!table.has("file")) table.missing("file"), draft.bodies_known = false;
     table.finish();
-    if (given != 1)
-      table.error("bodies", fmt::format("{} selections are given; give one of {{ overlapping = \"FACE\" }}, {{ ids = "
-                                        "[...] }}, {{ group = \"...\" }}",
-                                        given));
-    draft.result.drives.push_back(std::move(drive));
+    if (spec.file.empty()) continue;
+    spec.copy = read_table(spec, draft, errors);
+    draft.grains.push_back(std::move(spec));
   }
 }
 

@@ -33,7 +33,7 @@ class OverlapSearch {
  public:
   OverlapSearch(const Case& c) : domain_(c.domain) {
     for (std::size_t i = 0; i < c.bodies.size(); ++i)
-      if (const auto* ball = std::get_if<Ball>(&c.bodies[i].shape)) {
+      if (const auto* ball = std::get_if<Ball>(&c.bodies[i].shape); ball && c.bodies[i].insert < 0) {
         const int level = static_cast<int>(std::ceil(std::log2(ball->radius) + 1));
         discs_.push_back({ball->centre, ball->radius, static_cast<int>(i), level});
         largest_ = std::max(largest_, ball->radius);
@@ -140,7 +140,7 @@ void warn_about_fixed_faces(Case& c) {
   std::string first;
   for (int i = 0; i < std::ssize(c.bodies); ++i) {
     const auto [gap, face] = gap_to_fixed_face(c.bodies[i], c);
-    if (face < 0 || is_prescribed(c, i)) continue;
+    if (face < 0 || c.bodies[i].insert >= 0 || is_prescribed(c, i)) continue;
     if (count++ == 0)
       first = fmt::format("{}: body {} lies {:.2g} cells from the fixed face {}", c.bodies[i].source, i, gap,
                           face_names[face]);
@@ -269,6 +269,26 @@ bool is_prescribed(const Case& c, int index) {
          std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, index, c.domain); });
 }
 
+void check_walls(const Case& c, Errors& errors) {
+  constexpr std::size_t most_reported = 20;
+  const std::size_t before = errors.count();
+  for (int face = 0; face < 2 * c.domain.dimension; ++face) {
+    if (!c.faces[face].position) continue;
+    const double plane = *c.faces[face].position;
+    const int k = face / 2;
+    const double rounding = on_face * (c.domain.upper[k] - c.domain.lower[k]) / c.domain.cells[k];
+    for (int i = 0; i < std::ssize(c.bodies) && errors.count() < before + most_reported; ++i) {
+      if (c.bodies[i].insert >= 0 || is_prescribed(c, i)) continue;
+      const Bounds b = bounds(c.bodies[i].shape);
+      const double end = face % 2 ? b.upper[k] : b.lower[k];
+      if (face % 2 ? end > plane + rounding : end < plane - rounding)
+        errors.add({c.bodies[i].source, 0}, "",
+                   fmt::format("body {} reaches to {} = {}, beyond the wall {}, which stands at {}; move one of the two", i,
+                               "xyz"[k], end, face_names[face], plane));
+    }
+  }
+}
+
 void check_points(const Case& c, Errors& errors) {
   constexpr std::size_t most_reported = 20;
   const Domain& d = c.domain;
@@ -362,6 +382,7 @@ double smallest_cell(const Domain& d) {
 }
 
 bool selects(const Drive& drive, const BodySpec& body, int index, const Domain& domain) {
+  if (body.insert >= 0) return false;
   if (drive.overlapping < 0)
     return std::ranges::find(drive.ids, index) != drive.ids.end() ||
            (!drive.group.empty() && body.group == drive.group);

@@ -254,17 +254,25 @@ std::vector<Vec3> Table::vectors(std::string_view key, int size) {
   return result;
 }
 
-MotionTable Table::motion(std::string_view key, int size) {
-  const toml::node* node = find(key);
-  if (!node) return {};
-  const toml::array* array = node->as_array();
-  if (!array || array->empty() || !array->get(0)->is_array()) {
-    if (size > 1) return as_vector(*node, key, size, any_finite);
-    return Vec3(as_number(*node, key, any_finite).value_or(0.0), 0, 0);
+/// A number, or a formula of t.
+Formula Table::as_formula(const toml::node& node, std::string_view key) {
+  if (!node.is_string()) return Formula(fmt::format("{}", as_number(node, key, any_finite).value_or(0.0)));
+  try {
+    Formula formula(node.as_string()->get());
+    formula.at(0);
+    return formula;
+  } catch (const std::exception& problem) {
+    error(key, fmt::format("{} {}; write one such as \"0.1 * sin(2 * pi * t)\"", in_quotes(node.as_string()->get()),
+                           problem.what()));
+    return Formula("0");
   }
+}
+
+/// Rows of a time and a value.
+MotionTable Table::as_rows(const toml::array& array, std::string_view key, int size) {
   MotionTable table;
   table.values.clear();
-  for (const auto& entry : *array) {
+  for (const auto& entry : array) {
     const toml::array* row = entry.as_array();
     if (!row || std::ssize(*row) != 1 + size) {
       error(key, fmt::format("must have rows of {} numbers: a time and {}", 1 + size, size));
@@ -280,6 +288,26 @@ MotionTable Table::motion(std::string_view key, int size) {
     for (int i = 0; i < size; ++i) value[i] = as_number(*row->get(1 + i), key, any_finite).value_or(0.0);
     table.values.push_back(value);
   }
+  return table;
+}
+
+MotionTable Table::motion(std::string_view key, int size) {
+  const toml::node* node = find(key);
+  if (!node) return {};
+  const toml::array* array = node->as_array();
+  if (array && !array->empty() && array->get(0)->is_array()) return as_rows(*array, key, size);
+  const bool formula =
+      size == 1 ? node->is_string()
+                : array && std::ranges::any_of(*array, [](const toml::node& entry) { return entry.is_string(); });
+  if (!formula && size == 1) return Vec3(as_number(*node, key, any_finite).value_or(0.0), 0, 0);
+  if (!formula) return as_vector(*node, key, size, any_finite);
+  if (size > 1 && std::ssize(*array) != size) {
+    error(key, fmt::format("has {} entries; must have {} numbers or formulas", array->size(), size));
+    return {};
+  }
+  MotionTable table;
+  for (int i = 0; i < 3; ++i)
+    table.formulas.push_back(i >= size ? Formula("0") : as_formula(size == 1 ? *node : *array->get(i), key));
   return table;
 }
 

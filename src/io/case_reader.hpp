@@ -100,8 +100,8 @@ class Table {
   std::vector<Vec3> vectors(std::string_view key, int size);
   /// One number for each direction, or one for all.
   Vec3 scalar_or_vector(std::string_view key, int size, const Range& range);
-  /// Numbers [size], or one where size is 1; or an array of rows of a time [s] and so many numbers. Zero where it is
-  /// not given.
+  /// Numbers [size], or one where size is 1, any of them as a formula of t; or an array of rows of a time [s] and so
+  /// many numbers. Zero where it is not given.
   MotionTable motion(std::string_view key, int size);
   std::array<bool, 3> booleans(std::string_view key, int size);
   std::vector<int> integers(std::string_view key);
@@ -130,6 +130,8 @@ class Table {
 
  private:
   const toml::array* list(std::string_view key, std::string_view what);
+  Formula as_formula(const toml::node& node, std::string_view key);
+  MotionTable as_rows(const toml::array& array, std::string_view key, int size);
   std::optional<double> as_number(const toml::node& node, std::string_view key, const Range& range);
   Vec3 as_vector(const toml::node& node, std::string_view key, int size, const Range& range);
 

@@ -1,4 +1,4 @@
-// [domain], [time], [solver], [contact], [boundary], [parallel] and [output].
+// [domain], [time], [solver], [contact], [parallel] and [output].
 
 #include "case_sections.hpp"
 
@@ -53,26 +53,6 @@ bool read_cells(Table& table, Domain& d) {
     d.cells[k] = static_cast<int>(whole);
   }
   return true;
-}
-
-/// Which faces the case may give: those of periodic directions and of the third dimension in 2D may not.
-std::string face_problem(const Domain& domain, int face) {
-  if (face / 2 >= domain.dimension) return "belongs to 3D; the case has dimension 2";
-  if (domain.periodic[face / 2])
-    return fmt::format("direction {} is periodic and has no faces; remove this or the periodicity", "xyz"[face / 2]);
-  return {};
-}
-
-void read_face(Table table, int dimension, Face& face) {
-  face.type = table.choice("type", face_type_names, FaceType::free);
-  const bool moves = face.type == FaceType::fixed || face.type == FaceType::wall;
-  if (table.has("velocity") && !moves) table.error("velocity", "is only for faces of type fixed or wall");
-  if (table.has("friction") && face.type != FaceType::wall) table.error("friction", "is only for faces of type wall");
-  if (table.has("leaving") && face.type != FaceType::free) table.error("leaving", "is only for faces of type free");
-  face.leaving = table.choice("leaving", leaving_names, face.leaving);
-  face.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
-  face.friction = table.number("friction", 0.0, friction_range);
-  table.finish();
 }
 
 /// A table that is given replaces the default; an empty one means never.
@@ -183,13 +163,15 @@ void read_domain(Table domain, Domain& d) {
     if (d.periodic[k] && d.cells[k] < 4)
       domain.error("periodic", fmt::format("direction {} has {} cells; a periodic direction needs at least 4", "xyz"[k],
                                            d.cells[k]));
-  d.gravity = domain.vector("gravity", dim, Vec3::Zero().eval());
+  d.gravity = domain.motion("gravity", dim);
   d.patch_cells = static_cast<int>(domain.integer("patch_cells", default_patch_cells(d, dim), 4, 4096));
   domain.finish();
 }
 
-void read_time(Table time, Time& result) {
-  if (!time.has("end") && !time.has("steps")) time.missing("end", "is missing; give end (simulated time, s) or steps");
+void read_time(Table time, bool staged, Time& result) {
+  const bool until = time.has("until");
+  if (!time.has("end") && !time.has("steps") && !until && !staged)
+    time.missing("end", "is missing; give end (simulated time, s) or steps");
   if (time.has("end")) result.end = time.number("end", std::nullopt, positive);
   if (time.has("steps")) result.steps = time.integer("steps", std::nullopt, 1, most_steps);
   result.cfl = time.number("cfl", 0.4, {0, 1, true});
@@ -220,6 +202,15 @@ void read_solver(Table solver, int dimension, SolverOptions& result) {
   solver.finish();
 }
 
+void read_damping(Table damping, StressUpdate update, DampingOptions& result) {
+  result.local = damping.number("local", 0.0, {0, 1, false, true});
+  result.viscous = damping.number("viscous", 0.0, not_negative);
+  result.relax = damping.boolean("relax", false);
+  if (result.local > 0 && update != StressUpdate::both && update != StressUpdate::modified_last)
+    damping.error("local", "needs solver.stress_update = \"both\" or \"modified_last\"");
+  damping.finish();
+}
+
 void read_contact(Table contact, const std::vector<Material>& materials, ContactOptions& c) {
   c.law = contact.choice("law", contact_law_names, c.law);
   c.release = contact.choice("release", release_names, c.release);
@@ -236,22 +227,6 @@ void read_contact(Table contact, const std::vector<Material>& materials, Contact
   c.separation = contact.number("separation", c.separation, not_negative);
   for (Table& pair : contact.tables("pair")) read_pair(std::move(pair), materials, c);
   contact.finish();
-}
-
-void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& faces) {
-  for (int face = 0; face < 6; ++face) {
-    if (face / 2 < domain.dimension && domain.periodic[face / 2]) faces[face].type = FaceType::periodic;
-    if (face / 2 >= domain.dimension && !boundary.present()) break;
-    const char* name = face_names[face];
-    if (!boundary.has(name)) continue;
-    const std::string problem = face_problem(domain, face);
-    if (problem.empty()) {
-      read_face(boundary.table(name), domain.dimension, faces[face]);
-    } else {
-      boundary.error(name, problem);
-    }
-  }
-  boundary.finish();
 }
 
 void read_parallel(Table parallel, ParallelOptions& result) {

@@ -7,7 +7,7 @@ namespace cairn::reading {
 
 /// One [[grains]] entry: a table of balls and what they share.
 struct GrainsSpec {
-  std::filesystem::path file;  // absolute
+  std::filesystem::path given, file;  // as the case has it, and absolute; empty where there is none
   std::string copy;            // its name beside the results
   int material = -1;           // -1: every row names its own
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
@@ -22,13 +22,17 @@ struct Draft {
   bool bodies_known = true;        // every grain table was read, so that the number of bodies is right
   std::size_t shaped_bodies = 0;   // bodies from [[bodies]]; the rest come from the tables
   std::vector<GrainsSpec> grains;  // in order
+  std::vector<std::string> inserted_tables;  // for each [[insert]] the copy of its table; empty where it has none
 };
 
 void read_domain(Table domain, Domain& result);
-void read_time(Table time, Time& result);
+/// `staged`: what ends the run may be a stage.
+void read_time(Table time, bool staged, Time& result);
 void read_solver(Table solver, int dimension, SolverOptions& result);
+void read_damping(Table damping, StressUpdate update, DampingOptions& result);
 void read_contact(Table contact, const std::vector<Material>& materials, ContactOptions& result);
-void read_boundary(Table boundary, const Domain& domain, std::array<Face, 6>& faces);
+/// After materials.
+void read_boundary(Table boundary, Draft& draft);
 void read_parallel(Table parallel, ParallelOptions& result);
 void read_output(Table output, const Draft& draft, Output& result);
 void read_materials(Table materials, int dimension, std::vector<Material>& result);
@@ -36,7 +40,19 @@ void read_materials(Table materials, int dimension, std::vector<Material>& resul
 std::optional<Shape> read_shape(Table table, int dimension, Errors& errors);
 void read_bodies(Table& root, Draft& draft, Errors& errors);
 void read_grains(Table& root, Draft& draft, Errors& errors);
+/// [[insert]] and [[remove]]; after all other bodies.
+void read_pouring(Table& root, Draft& draft, Errors& errors);
+/// What the bodies of a table share, and where it is.
+GrainsSpec read_grains_spec(Table& table, Draft& draft);
+/// Appends the bodies of a table; returns the name of its copy.
+std::string read_table(const GrainsSpec& spec, Draft& draft, Errors& errors);
 void read_drives(Table& root, Draft& draft);
+/// time.until and [[stage]], of a case that is right without them.
+void read_stages(const toml::table& tree, Table& root, Draft& draft, Errors& errors);
+/// A value as TOML on one line.
+std::string inline_text(const toml::node& node);
+/// The conditions as TOML.
+std::string until_text(const Until& until);
 /// [[cracks]] and [crack]; after bodies and contact.
 void read_cracks(Table& root, Draft& draft);
 /// Appends the cracks of an entry that lays one in many bodies.
@@ -63,6 +79,8 @@ void check_pressures(const Draft& draft, Errors& errors);
 std::string placement_problem(const Shape& shape, const Domain& domain);
 /// Adds the warnings: overlapping balls, bodies thinner than two cells, bodies held by a fixed face.
 void warn_about_bodies(Case& result);
+/// Bodies lie in front of the walls.
+void check_walls(const Case& c, Errors& errors);
 /// A body that gets no material point is an error.
 void check_points(const Case& c, Errors& errors);
 

@@ -100,27 +100,54 @@ class Writer {
     vector("velocity", v);
     spin(w);
   }
-  /// The `size` components from `first` on, a number where it is one; with rows of times where they change.
-  std::string table_of(const MotionTable& table, int first, int size) const {
-    const auto row = [&](const Vec3& v) { return size == 1 ? text_of(v[first]) : list_of(v, size); };
-    if (!table.varies()) return row(table.values.front());
-    std::string rows;
-    for (std::size_t i = 0; i < table.times.size(); ++i) {
-      rows += fmt::format("{}[{}", i ? ", " : "", text_of(table.times[i]));
-      for (int k = first; k < first + size; ++k) rows += ", " + text_of(table.values[i][k]);
-      rows += "]";
+  /// The `size` components from `first` on, a number where it is one; with rows of times or formulas where they change.
+  static std::string table_of(const MotionTable& table, int first, int size) {
+    std::string text;
+    if (!table.formulas.empty()) {
+      for (int k = first; k < first + size; ++k) text += (k > first ? ", " : "") + text_of(table.formulas[k].text());
+      return size == 1 ? text : "[" + text + "]";
     }
-    return "[" + rows + "]";
+    if (!table.varies()) {
+      const Vec3 v = table.values.front();
+      return size == 1 ? text_of(v[first]) : list_of(v, size);
+    }
+    for (std::size_t i = 0; i < table.times.size(); ++i) {
+      text += fmt::format("{}[{}", i ? ", " : "", text_of(table.times[i]));
+      for (int k = first; k < first + size; ++k) text += ", " + text_of(table.values[i][k]);
+      text += "]";
+    }
+    return "[" + text + "]";
+  }
+  /// `along` is not given for walls. Nothing where there is no piston.
+  std::string piston_of(const Piston& p, bool along) const {
+    if (p.mass == 0) return {};
+    std::string text = fmt::format("{} = {{ {} = {}", p.gain > 0 ? "servo" : "piston", p.pressure ? "pressure" : "force",
+                                   table_of(p.force, 0, 1));
+    if (p.force.repeat) text += ", repeat = true";
+    if (p.area > 0) text += ", area = " + text_of(p.area);
+    if (along) text += ", along = " + list_of(p.along, dim_);
+    text += p.gain > 0 ? fmt::format(", gain = {}, largest = {}", text_of(p.gain), text_of(p.largest))
+                    : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
+    return text + " }";
   }
   void drive(const Drive& d) {
     raw("velocity", table_of(d.velocity, 0, dim_));
     raw("angular_velocity", table_of(d.angular_velocity, dim_ == 3 ? 0 : 2, dim_ == 3 ? 3 : 1));
     if (d.velocity.repeat || d.angular_velocity.repeat) key("repeat", true);
-    if (d.piston.mass > 0)
-      raw("piston",
-          fmt::format("{{ mass = {}, along = {}, force = {}, repeat = {} }}", text_of(d.piston.mass),
-                      list_of(d.piston.along, dim_), table_of(d.piston.force, 0, 1), text_of(d.piston.force.repeat)));
+    if (d.about) vector("about", *d.about);
+    if (d.piston.mass > 0) text_ += piston_of(d.piston, true) + "\n";
   }
+  void face(std::string_view name, const Face& f) {
+    std::string text = fmt::format("{{ type = \"{}\"", name_of(face_type_names, f.type));
+    if (f.type == FaceType::fixed || f.type == FaceType::wall) text += ", velocity = " + table_of(f.velocity, 0, dim_);
+    if (f.velocity.repeat) text += ", repeat = true";
+    if (f.type == FaceType::free) text += fmt::format(", leaving = \"{}\"", name_of(leaving_names, f.leaving));
+    if (f.type == FaceType::wall) text += ", friction = " + text_of(f.friction);
+    if (f.position) text += ", position = " + text_of(*f.position);
+    if (f.piston.mass > 0) text += ", " + piston_of(f.piston, false);
+    raw(name, text + " }");
+  }
+  void text(std::string_view lines) { text_ += lines; }
   std::string take() { return std::move(text_); }
 
  private:
@@ -135,7 +162,7 @@ void write_domain(Writer& out, const Domain& d) {
   out.vector("upper", d.upper);
   out.raw("cells", list_of(d.cells, d.dimension));
   out.raw("periodic", list_of(d.periodic, d.dimension));
-  out.vector("gravity", d.gravity);
+  out.raw("gravity", Writer::table_of(d.gravity, 0, d.dimension));
   out.key("patch_cells", d.patch_cells);
 }
 
@@ -145,6 +172,7 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   if (time.steps != Time{}.steps) out.key("steps", time.steps);
   out.key("cfl", time.cfl);
   if (time.dt > 0) out.key("dt", time.dt);
+  if (time.until.given()) out.raw("until", until_text(time.until));
   if (time.wall_limit > 0) out.key("wall_limit", time.wall_limit);
   out.section("[solver]");
   out.key("shape", name_of(shape_function_names, solver.shape));
@@ -223,6 +251,17 @@ void write_bodies(Writer& out, const Draft& draft) {
     out.key("initial_pressure", grains.initial_pressure);
     if (!grains.group.empty()) out.key("group", grains.group);
   }
+  for (const auto& insert : c.inserts) {
+    out.section("[[insert]]");
+    out.text(insert.text);
+  }
+  for (const auto& remove : c.removes) {
+    out.section("[[remove]]");
+    out.raw("region", std::visit(ShapeWriter{c.domain.dimension}, remove.region));
+    out.key("start", remove.start);
+    if (std::isfinite(remove.end)) out.key("end", remove.end);
+    out.key("every", remove.every);
+  }
   for (const auto& drive : c.drives) {
     out.section("[[drive]]");
     if (drive.overlapping >= 0) {
@@ -294,12 +333,23 @@ void write_boundary(Writer& out, const Case& c) {
   for (int i = 0; i < 2 * c.domain.dimension; ++i) {
     const Face& face = c.faces[i];
     if (face.type == FaceType::periodic) continue;
-    std::string text = fmt::format("{{ type = \"{}\"", name_of(face_type_names, face.type));
-    if (face.type == FaceType::fixed || face.type == FaceType::wall)
-      text += ", velocity = " + list_of(face.velocity, c.domain.dimension);
-    if (face.type == FaceType::free) text += fmt::format(", leaving = \"{}\"", name_of(leaving_names, face.leaving));
-    if (face.type == FaceType::wall) text += ", friction = " + text_of(face.friction);
-    out.raw(face_names[i], text + " }");
+    out.face(face_names[i], face);
+  }
+}
+
+void write_damping(Writer& out, const DampingOptions& damping) {
+  out.section("[damping]");
+  out.key("local", damping.local);
+  out.key("viscous", damping.viscous);
+  out.key("relax", damping.relax);
+}
+
+void write_stages(Writer& out, const std::vector<RunStage>& stages) {
+  for (const RunStage& stage : stages) {
+    out.section("[[stage]]");
+    out.key("name", stage.name);
+    if (stage.until.given()) out.raw("until", until_text(stage.until));
+    if (!stage.set.empty()) out.raw("set", stage.set);
   }
 }
 
@@ -344,6 +394,8 @@ std::string write_case(const Draft& draft) {
   write_bodies(out, draft);
   write_cracks(out, c);
   write_boundary(out, c);
+  write_damping(out, c.damping);
+  write_stages(out, c.stages);
   write_parallel(out, c.parallel);
   write_output(out, c.output);
   return out.take();

@@ -22,7 +22,8 @@ double point_speed_of(const Case& c, int index) {
   Vec3 velocity = body.velocity, spin = body.angular_velocity;
   for (const auto& drive : c.drives)
     if (selects(drive, body, index, c.domain))
-      velocity = Vec3(drive.velocity.largest(), 0, 0), spin = Vec3(0, 0, drive.angular_velocity.largest());
+      velocity = Vec3(drive.velocity.largest(c.time.end), 0, 0),
+      spin = Vec3(0, 0, drive.angular_velocity.largest(c.time.end));
   if (spin == Vec3::Zero()) return velocity.norm();
   double reach = 0;
   if (const auto* ball = std::get_if<Ball>(&body.shape)) {

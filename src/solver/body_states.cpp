@@ -148,7 +148,8 @@ std::vector<BodyState> body_states(const Simulation<Dim>& simulation) {
   std::vector<double> pairs;
   for (const auto& patch : simulation.patches())
     for (const auto& [pair, sum] : patch.contacts)
-      for (const auto& [a, b] : {pair, std::pair(pair.second, pair.first)}) pairs.push_back(a), pairs.push_back(b);
+      if (pair.second < shares.bodies)  // not a wall
+        for (const auto& [a, b] : {pair, std::pair(pair.second, pair.first)}) pairs.push_back(a), pairs.push_back(b);
   const auto seen = send_home(pairs, 2, shares, simulation.communicator());
   std::map<int, std::map<int, bool>> partners;
   for (std::size_t i = 0; i < seen.size(); i += 2)
@@ -158,8 +159,27 @@ std::vector<BodyState> body_states(const Simulation<Dim>& simulation) {
 }
 
 template <int Dim>
+std::vector<double> sizes_of_bodies(const Simulation<Dim>& simulation, const std::vector<PieceVector>& parts) {
+  constexpr int width = 5;
+  std::vector<double> records;
+  for (const PieceVector& part : parts)
+    records.insert(records.end(), {double(part.body), std::bit_cast<double>(part.patch), part.value[0], part.value[1],
+                                   part.value[2]});
+  const auto incoming = send_home(records, width, shares_of(simulation), simulation.communicator());
+  std::map<std::pair<int, PatchId>, Vec3> ordered;
+  for (std::size_t i = 0; i < incoming.size(); i += width)
+    ordered[{static_cast<int>(incoming[i]), std::bit_cast<PatchId>(incoming[i + 1])}] = Vec3(&incoming[i + 2]);
+  std::map<int, Vec3> sums;
+  for (const auto& [key, value] : ordered) sums.try_emplace(key.first, Vec3::Zero()).first->second += value;
+  std::vector<double> sizes;
+  for (const auto& [body, sum] : sums) sizes.push_back(sum.norm());
+  return sizes;
+}
+
+template <int Dim>
 std::vector<ContactState> contact_states(const Simulation<Dim>& simulation, double duration) {
-  constexpr int width = 3 + ContactSum<Dim>::size;
+  using S = ContactSum<Dim>;
+  constexpr int width = 3 + S::size;
   std::vector<double> records;
   for (const auto& patch : simulation.patches())
     for (const auto& [pair, sum] : patch.contacts) {
@@ -176,23 +196,28 @@ std::vector<ContactState> contact_states(const Simulation<Dim>& simulation, doub
     auto& sum = sums[{std::get<0>(key), std::get<1>(key)}].values;
     // A contact may lie across a periodic boundary: bring the parts together before their positions are averaged.
     for (int d = 0; d < Dim; ++d) {
-      const int at = 1 + Dim + d;
+      const int at = S::place + d;
       const double length = simulation.lattice().length(d);
-      if (simulation.lattice().periodic(d) && sum[0] > 0)
-        sum[at] -= values[0] * length * std::round((values[at] / values[0] - sum[at] / sum[0]) / length);
+      if (!simulation.lattice().periodic(d) || !(sum[0] > 0)) continue;
+      const double shift = length * std::round((values[at] / values[0] - sum[at] / sum[0]) / length);
+      sum[at] -= values[0] * shift;
+      for (int i = 0; i < Dim; ++i) sum[S::moment + i * Dim + d] -= values[S::impulse + i] * shift;
     }
     for (int i = 0; i < ContactSum<Dim>::size; ++i) sum[i] += values[i];
   }
   std::vector<ContactState> states;
   for (const auto& [pair, sum] : sums) {
     ContactState s;
-    s.body_a = pair.first, s.body_b = pair.second;
+    const auto count = static_cast<int>(simulation.bodies().size());
+    s.body_a = pair.first, s.body_b = pair.second < count ? pair.second : count - 1 - pair.second;
     const double* v = sum.values.data();
     for (int d = 0; d < Dim; ++d) {
-      s.force[d] = v[1 + d] / duration;
-      s.point[d] = v[1 + Dim + d] / v[0];
-      s.normal[d] = v[1 + 2 * Dim + d];
+      s.force[d] = v[S::impulse + d] / duration;
+      s.point[d] = v[S::place + d] / v[0];
+      s.normal[d] = v[S::normal + d];
+      for (int j = 0; j < Dim; ++j) s.moment(d, j) = v[S::moment + d * Dim + j] / duration;
     }
+    s.slip = v[S::slip] / v[0], s.friction_work = v[S::friction], s.sticking = v[S::stuck] / v[0];
     if (s.normal.norm() > 0) s.normal.normalize();
     states.push_back(s);
   }
@@ -201,6 +226,8 @@ std::vector<ContactState> contact_states(const Simulation<Dim>& simulation, doub
 
 template std::vector<BodyState> body_states(const Simulation<2>&);
 template std::vector<BodyState> body_states(const Simulation<3>&);
+template std::vector<double> sizes_of_bodies(const Simulation<2>&, const std::vector<PieceVector>&);
+template std::vector<double> sizes_of_bodies(const Simulation<3>&, const std::vector<PieceVector>&);
 template std::vector<ContactState> contact_states(const Simulation<2>&, double);
 template std::vector<ContactState> contact_states(const Simulation<3>&, double);
 

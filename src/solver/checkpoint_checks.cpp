@@ -30,6 +30,8 @@ std::string problem_of_numbers(const RunState& state) {
                            {"_bytes", 0, any},
                            {"dt", 0, any},
                            {"_speed", 0, any},
+                           {"kinetic", 0, any},
+                           {"kinetic_before", 0, any},
                            {"energy_started", 0, 1},
                            {"energy_largest", 0, any},
                            {"contacts_cleared", 0, time},
@@ -74,6 +76,10 @@ std::string problem_of_series(const RunState& state) {
 std::string problem_of(const RunState& state) {
   if (!(state.step.time >= 0 && std::isfinite(state.step.time)) || state.step.steps < 0)
     return fmt::format("its step {} or time {} s is none that a run reaches", state.step.steps, state.step.time);
+  for (const double number : state.stage)
+    if (!std::isfinite(number)) return "the state of its stage is not finite";
+  for (const double number : state.pouring)
+    if (!std::isfinite(number)) return "the state of its pouring is not finite";
   for (const double number : state.tools)
     if (!std::isfinite(number)) return "the state of a tool is not finite";
   const std::string problem = problem_of_numbers(state);
@@ -114,9 +120,11 @@ std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, Pat
 }
 
 template <int Dim>
-std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, std::size_t body_count) {
+std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, std::size_t body_count,
+                       std::size_t partner_count) {
   const auto& [a, b] = bodies;
-  if (a < 0 || a >= b || static_cast<std::size_t>(b) >= body_count)
+  if (a < 0 || a >= b || static_cast<std::size_t>(a) >= body_count ||
+      static_cast<std::size_t>(b) >= partner_count)
     return fmt::format("it holds a contact of bodies {} and {}; the case has {} bodies", a, b, body_count);
   for (const double value : sum.values)
     if (!std::isfinite(value)) return fmt::format("the contact of bodies {} and {} is not finite", a, b);
@@ -132,8 +140,8 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   add("time", state.step.time), add("step", state.step.steps);
   for_each_number(state, add);
   for (const auto& entry : state.series) add(entry.name, entry.time);
-  sum.add_values(std::span(state.tools)), sum.add_values(std::span(state.cracks));
-  sum.add_values(std::span(state.parts)), sum.add_values(std::span(state.spared));
+  for (const auto* values : {&state.stage, &state.pouring, &state.tools, &state.cracks, &state.parts, &state.spared})
+    sum.add_values(std::span(*values));
   add("case", std::ssize(case_text));
   sum.add_values(std::span(case_text.data(), case_text.size()));
   return sum.value();
@@ -141,7 +149,7 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
 
 #define CAIRN_INSTANTIATE(Dim)                                                      \
   template std::string problem_of(const Piece<Dim>&, const Lattice<Dim>&, PatchId); \
-  template std::string problem_of(std::pair<int, int>, const ContactSum<Dim>&, std::size_t);
+  template std::string problem_of(std::pair<int, int>, const ContactSum<Dim>&, std::size_t, std::size_t);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

@@ -24,7 +24,8 @@ std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, Pat
 
 /// Bodies a < b that exist, and sums that are finite.
 template <int Dim>
-std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, std::size_t body_count);
+std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, std::size_t body_count,
+                       std::size_t partner_count);
 
 /// Checksum of all that is no column of a patch: the numbers of the state, its index, and the case.
 std::uint64_t checksum_of(const RunState& state, const std::string& case_text);

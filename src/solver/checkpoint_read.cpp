@@ -138,7 +138,7 @@ void read_contacts(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const L
                  fmt::format("the contacts of patch {} are not in their order", patch.id));
       ContactSum<Dim> sum;
       std::copy_n(&sums[row * size], size, sum.values.begin());
-      const std::string problem = problem_of(pair, sum, body_count);
+      const std::string problem = problem_of(pair, sum, body_count, body_count + 2 * Dim);
       in.require(problem.empty(), problem);
       patch.contacts[pair] = sum;
     }
@@ -267,6 +267,8 @@ RunState read_state(const CheckpointReader& reader) {
     }
   });
   state.step.time = reader.table().time(), state.step.steps = reader.table().step();
+  state.stage = reader.column<double>("stage_state");
+  state.pouring = reader.column<double>("pouring_state");
   state.tools = reader.column<double>("tool_state", tool_state_size);
   state.cracks = reader.column<double>("crack_state", Crack::state_size);
   state.parts = reader.column<double>("part_of");

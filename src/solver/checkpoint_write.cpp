@@ -216,6 +216,8 @@ void write_state(CheckpointWriter& writer, const RunState& state, MPI_Comm comm)
   std::string names;
   for (const auto& entry : state.series) times.push_back(entry.time), names += entry.name + "\n";
   write_on_first(writer, "series_time", 1, times, comm);
+  write_on_first(writer, "stage_state", 1, state.stage, comm);
+  write_on_first(writer, "pouring_state", 1, state.pouring, comm);
   write_on_first(writer, "tool_state", tool_state_size, state.tools, comm);
   write_on_first(writer, "crack_state", Crack::state_size, state.cracks, comm);
   write_on_first(writer, "part_of", 1, state.parts, comm);

@@ -24,7 +24,8 @@ std::vector<std::string> history_columns(int dimension) {
                              "filter_dissipation", "contact_gain", "points_stopped", "points_left", "points_lost",
                              "mass_left", "energy_left", "momentum_left_x", "momentum_left_y"});
   if (dimension == 3) names.emplace_back("momentum_left_z");
-  names.insert(names.end(), {"crack_energy", "crack_dissipation"});
+  names.insert(names.end(), {"crack_energy", "crack_dissipation", "damping_dissipation", "unbalanced_force",
+                             "largest_unbalanced_force"});
   return names;
 }
 
@@ -87,7 +88,8 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   row.emplace_back(static_cast<std::int64_t>(t.points_lost));
   for (const double left : {t.mass_left, t.energy_left, t.momentum_left_x, t.momentum_left_y}) row.emplace_back(left);
   if (Dim == 3) row.emplace_back(t.momentum_left_z);
-  row.emplace_back(t.crack_energy), row.emplace_back(t.crack_dissipation);
+  row.insert(row.end(), {t.crack_energy, t.crack_dissipation, t.damped, simulation.force_balance().mean(),
+                         simulation.force_balance().largest()});
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

@@ -307,9 +307,15 @@ void write_contacts(const Simulation<Dim>& simulation, const std::filesystem::pa
   auto& point = columns.add_doubles("point", 3);
   auto& normal = columns.add_doubles("normal", 3);
   auto& force = columns.add_doubles("force", 3);
+  auto& moment = columns.add_doubles("moment", 9);
+  auto& slip = columns.add_doubles("slip", 1);
+  auto& friction = columns.add_doubles("friction_work", 1);
+  auto& sticking = columns.add_doubles("sticking", 1);
   for (const ContactState& s : states) {
     body_a.push_back(s.body_a), body_b.push_back(s.body_b);
     append(position, s.point), append(point, s.point), append(normal, s.normal), append(force, s.force);
+    for (int i = 0; i < 9; ++i) moment.push_back(s.moment(i / 3, i % 3));
+    slip.push_back(s.slip), friction.push_back(s.friction_work), sticking.push_back(s.sticking);
   }
   const RowBlocks rows = consecutive_rows(static_cast<std::int64_t>(states.size()), simulation.communicator());
   write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(),

@@ -17,6 +17,7 @@
 #include "cairn/solver/output.hpp"
 #include "history_tables.hpp"
 #include "restart.hpp"
+#include "stage_keeper.hpp"
 #include "stop_signal.hpp"
 
 namespace cairn {
@@ -34,16 +35,19 @@ constexpr double wall_limit_reached = 1000, file_failed = 2000;
 /// For each mass [J/kg]; EnergyBook.
 double energy_that_matters(const Case& c) {
   double speed = 0;
-  for (const auto& drive : c.drives) speed = std::max(speed, drive.velocity.largest());
-  for (const auto& face : c.faces) speed = std::max(speed, face.velocity.norm());
-  return c.domain.gravity.norm() * smallest_cell(c.domain) + 0.5 * speed * speed;
+  for (const auto& drive : c.drives) speed = std::max(speed, drive.velocity.largest(c.time.end));
+  for (const auto& face : c.faces) speed = std::max(speed, face.velocity.largest(c.time.end));
+  return c.domain.gravity.largest(c.time.end) * smallest_cell(c.domain) + 0.5 * speed * speed;
 }
 
 template <int Dim>
 class Run {
  public:
-  Run(const Case& c, const RunSettings& settings, MPI_Comm comm, const Checkpoint* from)
+  /// \param stages  where the run stands among the stages of the case as it was given
+  /// \param c       the case as it is in that stage; changes with the stages
+  Run(Case& c, StageKeeper& stages, const RunSettings& settings, MPI_Comm comm, const Checkpoint* from)
       : case_(c),
+        stages_(stages),
         settings_(settings),
         comm_(comm),
         roll_call_(comm),
@@ -57,15 +61,14 @@ class Run {
         history_clock_(c.output.history),
         checkpoints_(c.output.checkpoint),
         particle_index_(settings.out / "particles.hdf.series"),
-        tables_(settings.out, c.output.track, c.output.forces.active(), c.output.tips.active()),
+        tables_(settings.out, c.output.track, writes_forces(c), c.output.tips.active()),
         book_(energy_that_matters(c)) {
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &ranks_);
-    for (const Schedule* s : {&c.output.particles, &c.output.grains, &c.output.contacts, &c.output.forces,
-                              &c.output.tips, &c.output.history, &c.output.checkpoint})
-      needs_wall_ = needs_wall_ || s->interval_wall > 0;
+    note_wall();
     if (from) restore(from->state());
     simulation_.ask([this] { return notice(); });
+    stages_.note_start(simulation_);
     open_files(from);
     for (const auto& warning : simulation_.warnings()) fmt::print(stderr, "warning: {}\n", printable(warning));
   }
@@ -96,7 +99,13 @@ class Run {
       const Notice agreed = advance();
       tell_notes();
       const double before = wall_clock();
+      const std::string ended = stages_.ended(simulation_);
+      if (!ended.empty() && !stages_.run_ended()) next_stage(ended, display);
       write_outputs(false, agreed.wall);
+      if (!ended.empty() && stages_.run_ended()) {
+        ended_ = ended;
+        break;
+      }
       if (rank_ == 0 && display.due(before)) display.show(progress(before - stepping), before);
       if (agreed.stop > 0 && running()) {
         display.finish();
@@ -110,6 +119,8 @@ class Run {
     display.finish();
     const Totals totals = simulation_.totals();
     if (rank_ == 0) tell_departures(totals);
+    if (!ended_.empty())
+      say(stdout, "ended at step {}, time {} s: {}\n", simulation_.steps(), simulation_.time(), ended_);
     report(step_wall);
     return done;
   }
@@ -118,12 +129,42 @@ class Run {
     return fmt::format("rank {} after step {}: {}", rank_, simulation_.steps(), reason);
   }
 
+  /// Goes on with what the next stage changes.
+  void next_stage(const std::string& why, ProgressDisplay& display) {
+    const RunStage* stage = &case_.stages[stages_.stage()];
+    display.finish();
+    if (rank_ == 0)
+      say(stdout, "stage {} ended at step {}, time {} s: {}\n", printable(stage->name), simulation_.steps(),
+          simulation_.time(), why);
+    stages_.begin_next(simulation_.time());
+    apply_stage(case_, *++stage, simulation_.time());
+    simulation_.change(case_);
+    stages_.note_start(simulation_);
+    const Output& o = case_.output;
+    particles_.change(o.particles), grains_.change(o.grains), contacts_.change(o.contacts), forces_.change(o.forces);
+    history_clock_.change(o.history), checkpoints_.change(o.checkpoint);
+    note_wall();
+  }
+
+  void note_wall() {
+    const Output& o = case_.output;
+    for (const Schedule* s : {&o.particles, &o.grains, &o.contacts, &o.forces, &o.tips, &o.history, &o.checkpoint})
+      needs_wall_ = needs_wall_ || s->interval_wall > 0;
+  }
+
+  static bool writes_forces(const Case& c) {
+    return c.output.forces.active() ||
+           std::ranges::any_of(c.stages, [](const RunStage& s) { return s.changed->output.forces.active(); });
+  }
+
   bool running() const { return simulation_.time() < case_.time.end && simulation_.steps() < case_.time.steps; }
 
   /// One step, and what the ranks told each other in it.
   Notice advance() {
     try {
-      simulation_.step(case_.time.end - simulation_.time());
+      const std::int64_t next = simulation_.steps() + 1;
+      simulation_.keep_balance(stages_.weighs(next) || history_clock_.may_be_due(next));
+      simulation_.step(stages_.end() - simulation_.time());
       return simulation_.notice();
     } catch (const RunError& error) {
       if (!roll_call_.all_here()) throw RankError(alone(error.what()));
@@ -271,6 +312,7 @@ class Run {
     state.step = simulation_.step_state();
     state.tools = simulation_.tool_states(), state.cracks = simulation_.crack_states();
     state.parts = simulation_.parts(), state.spared = simulation_.spared();
+    state.stage = stages_.state(), state.pouring = simulation_.pouring();
     tables_.note_positions(state);
     share_rank_zero(state);
     state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
@@ -308,7 +350,11 @@ class Run {
     wall_before_ = state.wall;
   }
 
-  bool contacts_kept() const { return grains_.active() || contacts_.active(); }
+  bool contacts_kept() const {
+    const auto asks = [](const Output& o) { return o.grains.active() || o.contacts.active(); };
+    return asks(case_.output) ||
+           std::ranges::any_of(case_.stages, [&](const RunStage& s) { return asks(s.changed->output); });
+  }
 
   double fraction() const {
     const double by_time = std::isfinite(case_.time.end) ? simulation_.time() / case_.time.end : 0;
@@ -364,7 +410,9 @@ class Run {
     say(stdout, "{}\n", format_summary(s));
   }
 
-  const Case& case_;
+  Case& case_;
+  StageKeeper& stages_;
+  std::string ended_;  // why the run ended, where a condition said so
   const RunSettings& settings_;
   MPI_Comm comm_;
   int rank_ = 0, ranks_ = 1;
@@ -386,16 +434,18 @@ class Run {
 };
 
 template <int Dim>
-int run(const Case& c, const RunSettings& settings, MPI_Comm comm) {
+int run(Case& c, const RunSettings& settings, MPI_Comm comm) {
   auto from = open_restart(c, settings, comm);
-  Run<Dim> work(c, settings, comm, from.get());
+  StageKeeper stages(c, from ? from->state().stage : std::vector<double>());
+  stages.bring_up(c);
+  Run<Dim> work(c, stages, settings, comm, from.get());
   from.reset();  // its file is open no longer than needed
   return work.execute();
 }
 
 }  // namespace
 
-int run_case(const Case& c, const RunSettings& settings, MPI_Comm comm) {
+int run_case(Case c, const RunSettings& settings, MPI_Comm comm) {
   return c.domain.dimension == 2 ? run<2>(c, settings, comm) : run<3>(c, settings, comm);
 }
 

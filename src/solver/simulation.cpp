@@ -80,15 +80,21 @@ void Simulation<Dim>::step(double longest) {
     });
     push_pistons();
   }
+  aim_walls();
   migrate_after([&](std::size_t p, P& patch) {
     again ? project_again(p, patch) : update_momentum(p, patch);
     finish_points(patch, share);
   });
   look_for_fault(1);
+  if (keep_balance_) balance_ = weigh_bodies();
   receive_points();
   end_tools();
   time_ += dt_;
   ++steps_;
+  relax();
+  remove_bodies();
+  insert_bodies();
+  if (gravity_.varies()) pull_by(gravity_.at(time_));
   if (parallel_.balance_every > 0 && steps_ % parallel_.balance_every == 0) balance();
 }
 
@@ -200,6 +206,7 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
     integrate(piece, dt_);
   }
   constrain_motion(patch, lattice_, contact_.faces, bodies_, dt_, last, contact_.keep_tools);
+  weigh_forces(patch);
 }
 
 template <int Dim>
@@ -239,6 +246,7 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
     face_motions_[&patch - patches_.data()] = find_face_velocities(patch.cracks, surroundings_of(patch));
   const auto time = timers_.measure(strained ? Stage::update : Stage::stress);
   for_pieces(patch, {{C::position, strained ? C::state : all_columns}}, [&](Piece<Dim>& piece) {
+    damp(patch, piece);
     finish_piece(patch, piece, share);
     patch.ledger.stopped += static_cast<double>(std::exchange(speeds_.stopped, 0));
     if (!projects_again()) motions_.take_back(piece.nodes.motion), velocities_.take_back(piece.nodes.velocity);
@@ -300,7 +308,7 @@ void Simulation<Dim>::start_speed_reduction() {
 template <int Dim>
 StepState Simulation<Dim>::step_state() {
   finish_speed_reduction();
-  return {time_, dt_, maxima_[0], maxima_[1], steps_};
+  return {time_, dt_, maxima_[0], maxima_[1], steps_, kinetic_};
 }
 
 template <int Dim>

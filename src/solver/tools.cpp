@@ -4,6 +4,7 @@
 
 #include <map>
 
+#include "cairn/core/error.hpp"
 #include "cairn/solver/simulation.hpp"
 
 namespace cairn {
@@ -36,7 +37,8 @@ std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
     tools[face].name = names_of_faces[face];
     tools[face].centre = 0.5 * (c.domain.lower + c.domain.upper);
     tools[face].centre[face / 2] = face % 2 ? c.domain.upper[face / 2] : c.domain.lower[face / 2];
-    tools[face].velocity = c.faces[face].velocity;
+    if (c.faces[face].position) tools[face].centre[face / 2] = *c.faces[face].position;
+    tools[face].velocity = c.faces[face].velocity, tools[face].piston = c.faces[face].piston;
   }
   for (std::size_t d = 0; d < c.drives.size(); ++d) {
     const Drive& drive = c.drives[d];
@@ -46,9 +48,11 @@ std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
     for (std::size_t b = 0; b < bodies.size(); ++b)
       if (selects(drive, c.bodies[b], static_cast<int>(b), c.domain)) {
         bodies[b].tool = static_cast<std::int32_t>(tools.size());
+        if (drive.about) bodies[b].centre = *drive.about;
         tool.centre += bodies[b].centre, ++count;
       }
     if (count > 0) tool.centre /= count;
+    if (drive.about) tool.centre = *drive.about;
     tools.push_back(std::move(tool));
   }
   for (std::size_t b = 0; b < bodies.size(); ++b) {
@@ -69,21 +73,86 @@ void Simulation<Dim>::begin_tools() {
     tool.spin_next = tool.spin.at(time_ + dt_);
   }
   for (const int b : moved_bodies_) bodies_[b].change = tools_[bodies_[b].tool].next - tools_[bodies_[b].tool].now;
+  for (int face = 0; face < 2 * Dim; ++face)
+    contact_.faces[face].velocity = (0.5 * (tools_[face].now + tools_[face].next)).template head<Dim>();
+}
+
+template <int Dim>
+template <class Wanted>
+std::vector<double> Simulation<Dim>::tool_records(Wanted&& wanted) const {
+  std::vector<double> records;
+  for (const auto& patch : patches_)
+    for (const auto& [tool, sum] : patch.tools) {
+      if (!wanted(tool)) continue;
+      records.push_back(patch.id), records.push_back(tool);
+      records.insert(records.end(), sum.total.begin(), sum.total.end());
+      records.insert(records.end(), sum.last.begin(), sum.last.end());
+    }
+  return records;
 }
 
 /// What bodies press in this step moves the pistons. Collective where there are some.
 template <int Dim>
 void Simulation<Dim>::push_pistons() {
   if (!has_pistons_) return;
-  const std::vector<ToolSum> sums = sum_in_order(gather_on_all(tool_records(true), comm_), tools_.size());
+  const auto pushed = [&](int tool) { return tools_[tool].piston.mass > 0; };
+  const std::vector<ToolSum> sums = sum_in_order(gather_on_all(tool_records(pushed), comm_), tools_.size());
   for (std::size_t t = 0; t < tools_.size(); ++t) {
     Tool& tool = tools_[t];
-    if (tool.piston.mass == 0) continue;
+    const Piston& piston = tool.piston;
+    if (piston.mass == 0) continue;
     const Vec3 pressed(sums[t].last[0], sums[t].last[1], sums[t].last[2]);
-    const double gained = (dt_ * tool.piston.force.at(time_).x() + pressed.dot(tool.piston.along)) / tool.piston.mass;
-    tool.speed += gained;
-    tool.next += gained * tool.piston.along;
+    double force = piston.force.at(time_).x();
+    if (piston.pressure) force *= piston.area > 0 ? piston.area : face_area(static_cast<int>(t));
+    const double gained = (dt_ * force + pressed.dot(piston.along) - dt_ * piston.damping * tool.speed) /
+                          (piston.mass + dt_ * piston.damping);
+    const double before = std::exchange(tool.speed, std::clamp(tool.speed + gained, -piston.largest, piston.largest));
+    tool.next += (tool.speed - before) * piston.along;
   }
+}
+
+/// Where the walls will stand at the end of the step.
+template <int Dim>
+void Simulation<Dim>::aim_walls() {
+  for (int face = 0; face < 2 * Dim; ++face) {
+    if (!contact_.faces[face].moves) continue;
+    const int d = face / 2;
+    const double to = transfer_.wall_from[d][face % 2] + dt_ * tools_[face].of_step()[d];
+    if (to < lattice_.lower()[d] - 1e-9 * lattice_.length(d) || to > lattice_.upper()[d] + 1e-9 * lattice_.length(d))
+      throw RunError(fmt::format("step {}: the wall {} leaves the domain; let the domain be larger and the wall begin "
+                                 "inside, at boundary.{}.position",
+                                 steps_ + 1, tools_[face].name, tools_[face].name));
+    transfer_.wall_to[d][face % 2] = to;
+    if (transfer_.wall_to[d][0] >= transfer_.wall_to[d][1])
+      throw RunError(fmt::format("step {}: the walls {} and {} meet", steps_ + 1, names_of_faces[2 * d],
+                                 names_of_faces[2 * d + 1]));
+  }
+}
+
+/// Walls stand where their tools are.
+template <int Dim>
+void Simulation<Dim>::place_walls() {
+  for (int face = 0; face < 2 * Dim; ++face) {
+    const int d = face / 2, side = face % 2;
+    double& plane = contact_.faces[face].plane;
+    plane = contact_.faces[face].moves ? tools_[face].place()[d] : side ? lattice_.upper()[d] : lattice_.lower()[d];
+    transfer_.wall_from[d][side] = transfer_.wall_to[d][side] = plane;
+  }
+  transfer_of_turning_.wall_from = transfer_.wall_from, transfer_of_turning_.wall_to = transfer_.wall_to;
+}
+
+template <int Dim>
+double Simulation<Dim>::face_distance(int face) const {
+  const int d = face / 2;
+  return transfer_.wall_from[d][1] - transfer_.wall_from[d][0];
+}
+
+template <int Dim>
+double Simulation<Dim>::face_area(int face) const {
+  double area = 1;
+  for (int d = 0; d < Dim; ++d)
+    if (d != face / 2) area *= face_distance(2 * d);
+  return area;
 }
 
 template <int Dim>
@@ -93,6 +162,27 @@ void Simulation<Dim>::end_tools() {
     tool.now = tool.next, tool.spin_now = tool.spin_next;
   }
   set_velocities_of_tools();
+  place_walls();
+}
+
+/// Sets the gravity of the steps from now on. What it changes of the points' potential energy is work from outside.
+template <int Dim>
+void Simulation<Dim>::pull_by(const Vec3& gravity) {
+  const Vec<Dim> change = gravity.head<Dim>() - transfer_.gravity;
+  if (change.isZero(0)) return;
+  transfer_.gravity = transfer_of_turning_.gravity = gravity.head<Dim>();
+  for (auto& patch : patches_)
+    for (auto& piece : patch.pieces) {
+      piece.projected = false;
+      if (is_rigid(piece)) continue;
+      const Points<Dim>& points = piece.points;
+      double lifted = 0;
+      for (int p = 0; p < points.size(); ++p)
+        for (int d = 0; d < Dim; ++d)
+          lifted += change[d] * points.column(PointColumns<Dim>::volume)[p] *
+                    (points.column(d)[p] + points.images()[p][d] * lattice_.length(d));
+      patch.ledger.boundary_work -= material_of(piece).density * lifted;
+    }
 }
 
 template <int Dim>
@@ -141,23 +231,15 @@ void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
   }
 }
 
-/// Sums of this rank's patches; of the pistons alone, or of all tools.
 template <int Dim>
-std::vector<double> Simulation<Dim>::tool_records(bool pistons) const {
-  std::vector<double> records;
-  for (const auto& patch : patches_)
-    for (const auto& [tool, sum] : patch.tools) {
-      if (pistons && tools_[tool].piston.mass == 0) continue;
-      records.push_back(patch.id), records.push_back(tool);
-      records.insert(records.end(), sum.total.begin(), sum.total.end());
-      records.insert(records.end(), sum.last.begin(), sum.last.end());
-    }
-  return records;
+std::vector<double> Simulation<Dim>::impulse_on(int tool) const {
+  const auto sums = sum_in_order(gather_on_all(tool_records([&](int t) { return t == tool; }), comm_), tools_.size());
+  return {sums[tool].total[0], sums[tool].total[1], sums[tool].total[2]};
 }
 
 template <int Dim>
 std::vector<ToolSum> Simulation<Dim>::tool_sums() const {
-  return sum_in_order(gather_on_first(tool_records(false), comm_), tools_.size());
+  return sum_in_order(gather_on_first(tool_records([](int) { return true; }), comm_), tools_.size());
 }
 
 template <int Dim>
@@ -173,6 +255,7 @@ void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
   for (std::size_t t = 0; t < tools_.size() && (t + 1) * tool_state_size <= states.size(); ++t)
     tools_[t].restore(&states[t * tool_state_size]);
   set_velocities_of_tools();
+  place_walls();
 }
 
 #define CAIRN_INSTANTIATE(Dim)                                              \
@@ -184,6 +267,12 @@ void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
   template void Simulation<Dim>::push_pistons();                            \
   template void Simulation<Dim>::end_tools();                               \
   template void Simulation<Dim>::set_velocities_of_tools();                 \
+  template void Simulation<Dim>::aim_walls();                               \
+  template void Simulation<Dim>::place_walls();                             \
+  template void Simulation<Dim>::pull_by(const Vec3&);                      \
+  template double Simulation<Dim>::face_distance(int) const;                \
+  template double Simulation<Dim>::face_area(int) const;                    \
+  template std::vector<double> Simulation<Dim>::impulse_on(int) const;      \
   template std::vector<ToolSum> Simulation<Dim>::tool_sums() const;
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

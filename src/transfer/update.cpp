@@ -102,21 +102,22 @@ void scatter_momentum(const Points<Dim>& points, int p, const Stencil<Dim, Shape
   scatter_moving<no_gradient>(points, p, stencil, lane, mass, Lanes4{}, momentum);
 }
 
-/// The faces that no point crosses.
+/// The walls, which no point crosses.
 template <int Dim>
 struct Walls {
-  Vec<Dim> lower, upper;
+  Vec<Dim> lower, upper, lower_way, upper_way;  // at the end of the step, and how far they came
 
-  Walls(const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings) {
+  Walls(const TransferSettings<Dim>& settings) {
     constexpr double nowhere = std::numeric_limits<double>::infinity();
     for (int d = 0; d < Dim; ++d) {
-      lower[d] = settings.walled[d][0] ? lattice.lower()[d] : -nowhere;
-      upper[d] = settings.walled[d][1] ? lattice.upper()[d] : nowhere;
+      const auto &from = settings.wall_from[d], &to = settings.wall_to[d];
+      lower[d] = settings.walled[d][0] ? to[0] : -nowhere, lower_way[d] = to[0] - from[0];
+      upper[d] = settings.walled[d][1] ? to[1] : nowhere, upper_way[d] = to[1] - from[1];
     }
   }
-  /// Where a point that moves from a to b stops; one that is beyond already goes no further.
+  /// Where a point that moves from a to b stops; one that is beyond already goes no further, seen from the wall.
   double stop(int d, double a, double b) const {
-    return std::min(std::max(b, std::min(a, lower[d])), std::max(a, upper[d]));
+    return std::min(std::max(b, std::min(a + lower_way[d], lower[d])), std::max(a + upper_way[d], upper[d]));
   }
 };
 
@@ -187,7 +188,7 @@ template <int Dim>
 void update_stress_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                             const Law& law, double density, double strain_dt, double dt, SpeedLimits& speeds) {
   double fastest_wave = speeds.wave * speeds.wave, fastest_point = speeds.point * speeds.point;
-  const Walls<Dim> walls(lattice, settings);
+  const Walls<Dim> walls(settings);
   std::visit(
       [&](const auto& any) {
         const auto& concrete = law_of_step(any, strain_dt);
@@ -256,7 +257,7 @@ template <int Dim>
 double accelerate_and_move(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                            double density, double dt, SpeedLimits& speeds) {
   double energy = 0, fastest = speeds.point * speeds.point;
-  const Walls<Dim> walls(lattice, settings);
+  const Walls<Dim> walls(settings);
   for_moving_piece(piece, lattice, settings, {motion_of(piece)}, [&](int first, int count, const auto& stencil) {
     energy += accelerate_points(piece, first, count, stencil, density, dt, settings, [&](int lane, const auto& m) {
       fastest = move(piece.points, first + lane, m, walls, dt, fastest, speeds.stopped);

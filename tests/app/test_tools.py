@@ -73,6 +73,132 @@ def test_a_piston_on_a_column_swings(cairn: Program, here: Path):
     assert all(abs(top - first) < 0.02 * (first - lowest) for top in swings), (swings, first)
 
 
+WALL = SPRING[:SPRING.index("[[bodies]]\nshape = { type = \"box\", lower = [0.0, 1.0]")] + """
+[contact]
+friction = 0.0
+[boundary]
+left = { type = "symmetry" }
+right = { type = "symmetry" }
+bottom = { type = "symmetry" }
+top = { type = "wall", position = 1.0 }
+[output]
+forces = { every = 1 }
+history = { every = 10 }
+"""
+MODULUS = 1e5 * (1 - 0.3) / ((1 + 0.3) * (1 - 2 * 0.3))  # of the column, in uniaxial strain
+
+
+def test_a_wall_is_a_piston_too(cairn: Program, here: Path):
+    """The same mass on the same spring, with a wall that moves through the cells: period and swing."""
+    (here / "wall.toml").write_text(WALL)
+    expect_code(cairn("run", here / "wall.toml", "--out", here / "out",
+                      *sets({"boundary.top.piston": "{ mass = 40.0, force = 200.0 }"}), timeout=300), 0)
+    rows = rows_of(here / "out", "top")
+    down = [(row["time"], -row["vy"]) for row in rows]
+    turns = [a[0] - a[1] * (b[0] - a[0]) / (b[1] - a[1]) for a, b in zip(down, down[1:]) if a[1] > 0 >= b[1]]
+    period = 2 * math.pi * math.sqrt((40 + 10 * 0.1 / 3) / (MODULUS * 0.1 / 1.0))
+    measured = (turns[-1] - turns[0]) / (len(turns) - 1)
+    assert abs(measured / period - 1) < 0.01, (measured, period)
+    assert abs((1.0 - min(row["y"] for row in rows)) / (2 * 200 / (MODULUS * 0.1)) - 1) < 0.02
+    with open(here / "out" / "history.csv", encoding="utf-8") as file:
+        assert abs(float(list(csv.DictReader(file))[-1]["energy_error"])) < 1e-3
+
+
+def test_a_servo_holds_its_pressure(cairn: Program, here: Path):
+    """A step of the pressure on a column: no overshoot of 5 %, then held within half a per cent."""
+    (here / "wall.toml").write_text(WALL)
+    force = 1000.0  # a strain of some 7 %
+    expect_code(cairn("run", here / "wall.toml", "--out", here / "out",
+                      *sets({"boundary.top.servo": f"{{ pressure = {force / 0.1} }}", "time.end": 0.5}), timeout=300), 0)
+    rows = rows_of(here / "out", "top")
+    crossing = math.sqrt(10 / MODULUS)  # of a wave through the column [s]
+    window = 100  # rows, a crossing: the force of single steps is the jolt of single nodes that the wall comes to
+    means = [(row["time"], (row["impulse_y"] - before["impulse_y"]) / (row["time"] - before["time"]))
+             for before, row in zip(rows, rows[window:])]
+    assert max(f for _, f in means) < 1.05 * force, max(f for _, f in means)
+    held = [f / force - 1 for t, f in means if t > 30 * crossing]
+    assert len(held) > 100 and math.sqrt(sum(h * h for h in held) / len(held)) < 0.005, held[:5]
+    shortened = 1.0 - rows[-1]["y"]
+    assert abs(shortened / (force / (MODULUS * 0.1)) - 1) < 0.06, shortened  # large strain
+
+
+def test_a_block_gives_back_what_it_took(cairn: Program, here: Path):
+    """Pressed through two cells by a wall that it sticks to, let go and pressed again, each time brought to rest: the same
+    force to 1e-5."""
+    turns = []
+    for way in (-1, 1, -1):
+        turns.append(f'[[stage]]\nuntil = {{ duration = 0.5 }}\n'
+                     f'set.boundary.top.velocity = [0.0, "{way} * 0.05 * pi * sin(2 * pi * t)"]\nset.damping.viscous = 20.0\n')
+        turns.append('[[stage]]\nuntil = { duration = 0.4 }\nset.boundary.top.velocity = [0.0, 0.0]\n'
+                     'set.damping.viscous = 200.0\n')
+    stick = '[[contact.pair]]\nmaterials = ["rubber", "wall"]\nlaw = "stick"\n'
+    (here / "wall.toml").write_text(WALL.replace("cells = [4, 48]", "cells = [2, 24]") + stick + "".join(turns))
+    expect_code(cairn("run", here / "wall.toml", "--out", here / "out", *sets({"time.end": 3.0}), timeout=600), 0)
+    rows = rows_of(here / "out", "top")
+    first, between, again = ([row for row in rows if row["time"] < t][-5] for t in (0.9, 1.8, 2.7))
+    assert abs(again["y"] - first["y"]) < 1e-4, (first["y"], again["y"])
+    assert abs(again["fy"] / first["fy"] - 1) < 1e-5, (again["fy"], first["fy"])
+    assert abs(between["fy"] / first["fy"]) < 2e-5, (between["fy"], first["fy"])
+
+
+def test_formulas_and_tables_say_the_same(cairn: Program, here: Path):
+    """A motion as a formula, and gravity as one, against tables of the same lines; and what changing gravity does is in the
+    book."""
+    (here / "wall.toml").write_text(WALL)
+    by_table = {"boundary.top.velocity": "[[0.0, 0.0, 0.0], [10.0, 0.0, -1.0]]",
+                "domain.gravity": "[[0.0, 0.0, 0.0], [10.0, 0.0, -300.0]]"}
+    by_formula = {"boundary.top.velocity": '[0.0, "-0.1 * t"]', "domain.gravity": '[0.0, "-30 * t"]'}
+    for name, motion in (("table", by_table), ("formula", by_formula)):
+        expect_code(cairn("run", here / "wall.toml", "--out", here / name, *sets({**motion, "time.end": 0.5}), timeout=300), 0)
+    a, b = rows_of(here / "table", "top"), rows_of(here / "formula", "top")
+    assert len(a) == len(b) and abs(a[-1]["y"] - b[-1]["y"]) < 1e-12 and abs(a[-1]["fy"] - b[-1]["fy"]) < 1e-6 * a[-1]["fy"]
+    with open(here / "formula" / "history.csv", encoding="utf-8") as file:
+        history = list(csv.DictReader(file))
+    assert max(abs(float(row["energy_error"])) for row in history) < 5e-3, max(float(row["energy_error"]) for row in history)
+
+
+def test_bodies_turn_about_a_point(cairn: Program, here: Path):
+    """Two blades on one shaft: after a quarter turn each is where the other axis was."""
+    (here / "blades.toml").write_text("""
+[domain]
+upper = [1.0, 1.0]
+cells = [40, 40]
+[time]
+end = 1.0
+[materials.rubber]
+model = "neo_hookean"
+density = 1000.0
+shear_modulus = 2.0e4
+bulk_modulus = 8.0e4
+[materials.steel]
+model = "rigid"
+[[bodies]]
+shape = { type = "disk", centre = [0.1, 0.1], radius = 0.06 }
+material = "rubber"
+[[bodies]]
+shape = { type = "box", lower = [0.55, 0.45], upper = [0.85, 0.55] }
+material = "steel"
+group = "blades"
+[[bodies]]
+shape = { type = "box", lower = [0.15, 0.45], upper = [0.45, 0.55] }
+material = "steel"
+group = "blades"
+[[drive]]
+bodies = { group = "blades" }
+about = [0.5, 0.5]
+angular_velocity = "pi / 2"
+[output]
+forces = { every = 50 }
+track = [1, 2]
+""")
+    expect_code(cairn("run", here / "blades.toml", "--out", here / "out", timeout=300), 0)
+    with open(here / "out" / "bodies.csv", encoding="utf-8") as file:
+        last = {int(row["body"]): row for row in csv.DictReader(file)}
+    for body, y in ((1, 0.7), (2, 0.3)):
+        assert abs(float(last[body]["x"]) - 0.5) < 1e-9 and abs(float(last[body]["y"]) - y) < 1e-9, last[body]
+    assert abs(rows_of(here / "out", "blades")[-1]["x"] - 0.5) < 1e-15
+
+
 def test_the_floor_bears_the_weight(cairn: Program, here: Path):
     """Disks of rubber come to rest in a box: what floor and walls bear is their weight."""
     case = ROOT / "cases" / "press.toml"
@@ -120,6 +246,10 @@ def test_bad_tools_are_refused(cairn: Program, here: Path):
     refused({"drive.0.piston.force": "[[0.0, 1.0], [0.0, 2.0]]"}, "times must ascend")
     refused({"drive.0.velocity": "[[0.0, 1.0]]"}, "must have rows of 3 numbers")
     refused({"drive.0.piston.speed": 1.0}, "unknown key")
+    refused({"drive.0.servo": "{ force = 1.0, along = [0.0, -1.0] }"}, "beside piston")
+    refused({"drive.0.piston.pressure": 1.0}, "beside force")
+    refused({"boundary.bottom.piston": "{ mass = 1.0, force = 1.0 }"}, "only for faces of type wall")
+    refused({"drive.0.piston.force": '"3 +"'}, "is no formula of t")
 
 
 def main() -> int:

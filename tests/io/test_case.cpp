@@ -146,7 +146,7 @@ track = [2, 0]
   ASSERT_EQ(again.drives.size(), 3u);
   EXPECT_EQ(again.drives[0].ids, (std::vector{1, 2}));
   EXPECT_EQ(again.drives[2].group, "g");
-  EXPECT_EQ(again.faces[0].velocity, Vec3(0, 1, 0));
+  EXPECT_EQ(again.faces[0].velocity.at(0), Vec3(0, 1, 0));
   EXPECT_EQ(again.faces[2].type, FaceType::periodic);
   EXPECT_EQ(again.parallel.partition, Partition::round_robin);
   EXPECT_FALSE(again.output.history.active());

@@ -182,14 +182,14 @@ void check_fall(StressUpdate update) {
   const double dt = 1e-3;
   const int steps = 300;
   Case c = soft_case(Dim, Dim == 2 ? 20 : 10, 5);
-  c.domain.gravity = Vec3(1, -8, Dim == 3 ? 0.5 : 0);
+  c.domain.gravity = MotionTable(Vec3(1, -8, Dim == 3 ? 0.5 : 0));
   c.solver.stress_update = update, c.time.dt = dt;
   add_body(c, Ball{Vec3(0.41, 0.67, Dim == 3 ? 0.43 : 0), 0.2});
   Simulation<Dim> simulation(c, MPI_COMM_WORLD);
   const auto start = points_of(simulation);
   const Totals totals = simulation.totals();
   for (int i = 0; i < steps; ++i) simulation.step(forever);
-  const Vec<Dim> g = c.domain.gravity.head<Dim>();
+  const Vec<Dim> g = c.domain.gravity.at(0).head<Dim>();
   for (const auto& [id, point] : points_of(simulation)) {  // v_n = n g dt, x_n = x_0 + n (n + 1)/2 g dt^2
     EXPECT_LE((point.v - steps * dt * g).norm(), 1e-12);
     EXPECT_LE((point.x - start.at(id).x - 0.5 * steps * (steps + 1) * dt * dt * g).norm(), 1e-12);

@@ -128,7 +128,7 @@ TEST(Cracks, FacesMoveWithTheirSides) {
 TEST(Cracks, ABlockSlidesAlongACrack) {
   Case c = soft_case(2, 60, 10);
   c.domain.upper = Vec3(6, 2, 0), c.domain.cells = {60, 20, 1};
-  c.domain.gravity = 10 * Vec3(0.5, -std::sqrt(0.75), 0);
+  c.domain.gravity = Vec3(10 * Vec3(0.5, -std::sqrt(0.75), 0));
   // Stiff: what the block slips while gravity comes on is lost for the comparison.
   c.materials[0].parameters = {{"shear_modulus", 1.2e7}, {"bulk_modulus", 2.4e7}};
   c.faces[2].type = FaceType::fixed;

@@ -20,6 +20,7 @@ struct PatchLedger {
   // what spins have now, it is what was lost: by blending, by relaxing spins, and as their inertia changes.
   double blended_and_spun = 0;
   double filtered = 0;       // taken by the filter of noise, from velocities and spins [J]
+  double damped = 0;         // taken by damping, likewise [J]
   double stopped = 0;        // times that a point was kept from crossing a wall
   double contact_nodes = 0;  // nodes with a contact impulse in the last step
   // Points that left the domain, those that were lost and dropped, and what both took along. Of rigid bodies the mass
@@ -40,6 +41,7 @@ inline constexpr LedgerColumn ledger_columns[] = {{"contact_dissipation", &Patch
                                                   {"boundary_work", &PatchLedger::boundary_work},
                                                   {"blended_and_spun", &PatchLedger::blended_and_spun},
                                                   {"filtered", &PatchLedger::filtered},
+                                                  {"damped", &PatchLedger::damped},
                                                   {"stopped", &PatchLedger::stopped},
                                                   {"contact_nodes", &PatchLedger::contact_nodes},
                                                   {"points_left", &PatchLedger::points_left},
@@ -50,11 +52,14 @@ inline constexpr LedgerColumn ledger_columns[] = {{"contact_dissipation", &Patch
                                                   {"momentum_left_y", &PatchLedger::momentum_left_y},
                                                   {"momentum_left_z", &PatchLedger::momentum_left_z}};
 
-/// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared.
+/// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared. A wall counts as a body:
+/// its number is that of all bodies plus that of its face.
 template <int Dim>
 struct ContactSum {
-  static constexpr int size = 1 + 3 * Dim;
-  /// Sum of |impulse| [N s], impulse on a, |impulse| x position, |impulse| x normal (from a to b).
+  /// Sum of |impulse| [N s], impulse on a, |impulse| x position, |impulse| x normal (from a to b), impulse (x) position,
+  /// |impulse| x way slipped, work of friction [J], |impulse| where it sticks.
+  static constexpr int impulse = 1, place = 1 + Dim, normal = 1 + 2 * Dim, moment = 1 + 3 * Dim;
+  static constexpr int slip = moment + Dim * Dim, friction = slip + 1, stuck = slip + 2, size = slip + 3;
   std::array<double, size> values{};
 };
 
@@ -68,7 +73,8 @@ struct Patch {
   int links_before = 0;            // links whose contributions come before the patch's own
   std::vector<Piece<Dim>> pieces;  // ascending in body; those without points are ghosts
   PatchLedger ledger;
-  double seconds = 0;  // processor time spent on it since the last balance; steers nothing but balance
+  double pressing = 0;  // sum of |contact force| on deformable bodies in the last step [N]
+  double seconds = 0;   // processor time spent on it since the last balance; steers nothing but balance
   std::map<std::pair<int, int>, ContactSum<Dim>> contacts;  // kept where an output asks for them
   std::map<int, ToolSum> tools;                             // by their number; likewise
   // Points of cracks: its own, and copies of those of neighbours within reach; ascending in (crack, index).
@@ -90,7 +96,7 @@ struct Patch {
 
   /// Takes back what was of the last step alone.
   void forget_last_step() {
-    ledger.contact_nodes = 0;
+    ledger.contact_nodes = 0, pressing = 0;
     for (auto& [tool, sum] : tools) sum.last = {};
   }
 

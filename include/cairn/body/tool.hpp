@@ -3,6 +3,7 @@
 /// from 0, then drives, then the rigid bodies that no drive moves.
 
 #include <array>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -35,11 +36,18 @@ struct ToolSum {
 };
 
 /// A weight that slides along a direction under a given force and what bodies press:
-/// mass dv/dt = force + (what bodies press) . along.
+/// mass dv/dt = force + (what bodies press) . along - damping v, |v| <= largest.
+/// A servo is one as light as a few cells of material, with the damping that gives it the velocity
+/// (force - what presses back) / damping.
 struct Piston {
   double mass = 0;            // [kg]; 0: not a piston
   Vec3 along = Vec3::Zero();  // unit
-  MotionTable force;          // its x component [N]
+  MotionTable force;          // its x component [N], or [Pa] where it is a pressure
+  double damping = 0;         // [N s/m]; of a servo 1 / gain
+  double gain = 0;            // of a servo [m/(N s)]; 0: not a servo
+  double largest = std::numeric_limits<double>::infinity();  // [m/s]
+  bool pressure = false;      // the force is that of a pressure on an area
+  double area = 0;            // [m^(Dim-1)]; 0: of the face between the other faces, where they stand
 };
 
 /// Numbers of a tool's state.
@@ -66,6 +74,7 @@ struct Tool {
   }
 
   bool moves() const { return piston.mass > 0 || velocity.varies() || spin.varies(); }
+  Vec3 place() const { return centre + travel; }
   /// Velocity and spin with which it moves in the step.
   Vec3 of_step() const { return piston.mass > 0 ? next : Vec3(0.5 * (now + next)); }
   Vec3 spin_of_step() const { return 0.5 * (spin_now + spin_next); }

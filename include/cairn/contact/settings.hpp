@@ -37,6 +37,8 @@ struct FaceCondition {
   Vec<Dim> velocity = Vec<Dim>::Zero();  // of a fixed face or wall [m/s]
   std::vector<PairLaw> friction;         // of a wall, for each material
   Leaving leaving = Leaving::remove;     // of a free face
+  bool moves = false;                    // a wall whose plane is not that of the domain's face, or will not be
+  double plane = 0;                      // then its position along the normal [m]
 };
 
 /// All faces, two for each direction (lower, upper); empty types in periodic directions.
@@ -48,6 +50,28 @@ template <int Dim>
 bool at_face(const Index<Dim>& place, int face, const Lattice<Dim>& lattice) {
   const int d = face / 2;
   return !lattice.periodic(d) && (face % 2 == 0 ? place[d] <= 0 : place[d] >= lattice.cells()[d]);
+}
+
+/// Cells from a node to the plane of a face, along its normal out of the domain; negative beyond it.
+template <int Dim>
+double cells_to_plane(const Index<Dim>& place, int face, const FaceCondition<Dim>& condition,
+                      const Lattice<Dim>& lattice) {
+  const int d = face / 2;
+  if (!condition.moves) return face % 2 ? lattice.cells()[d] - place[d] : place[d];
+  const double plane = lattice.scaled(d, condition.plane);
+  return face % 2 ? plane - place[d] : place[d] - plane;
+}
+
+/// Cells in front of a moving wall within which it acts on nodes: it acts on those nearer to its plane than to the next
+/// layer.
+inline constexpr double wall_reach = 0.5;
+
+/// Whether a wall acts on a node.
+template <int Dim>
+bool at_wall(const Index<Dim>& place, int face, const FaceConditions<Dim>& faces, const Lattice<Dim>& lattice) {
+  if (faces[face].type != FaceType::wall) return false;
+  return faces[face].moves ? cells_to_plane<Dim>(place, face, faces[face], lattice) <= wall_reach
+                           : at_face<Dim>(place, face, lattice);
 }
 
 /// Share of a node in sums over a patch: 0 where another patch answers for it. On a symmetry plane sums hold both
@@ -71,6 +95,7 @@ struct ContactSettings {
   FaceConditions<Dim> faces{};
   std::vector<CrackContact> cracks;
   contact::TouchingGap gap, gap_at_wall;
+  int bodies = 0;              // of the case: contacts with faces are numbered behind them
   bool keep_contacts = false;  // sum what passes between pairs, for output
   bool keep_tools = false;     // sum what bodies do to tools
   // Rigid bodies turn along chords (contact/course.hpp), not tangents. Chords strain what sticks to them by t^2/2 in
@@ -79,8 +104,11 @@ struct ContactSettings {
 
   static ContactSettings make(const ContactOptions& options, std::vector<ContactMaterial> materials,
                               const FaceConditions<Dim>& faces);
-  /// Volume that bodies around a node have [m^Dim]: a cell, less where walls and fixed faces take a part.
-  double room(const Index<Dim>& place, const Lattice<Dim>& lattice) const;
+  /// Volume that bodies around a node have [m^Dim]: a cell, less where walls and fixed faces, but for one of them, take
+  /// a part.
+  double room(const Index<Dim>& place, const Lattice<Dim>& lattice, int but_for = -1) const;
+  /// The nearest node that is no further beyond a wall than the first layer on its plane or behind.
+  Index<Dim> node_at_walls(Index<Dim> place, const Lattice<Dim>& lattice) const;
   /// A body's gradient of volume at a node in cells of size 1, from its NodeSums there; that of mass is divided by the
   /// density.
   Vec<Dim> gradient_share(const double* sums, const Lattice<Dim>& lattice, double room) const;

@@ -145,7 +145,8 @@ class ContactSweep {
 
   // sweep.cpp
   void load_node(const Node& node, const Patch<Dim>& patch, Pass pass, double dt);
-  void keep_contacts(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
+  void keep_contacts(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice,
+                     const ContactSettings<Dim>& settings, double dt) const;
   void keep_tools(const Node& node, Patch<Dim>& patch, const Lattice<Dim>& lattice) const;
   void keep_ledger(const Node& node, Patch<Dim>& patch, double dt, bool projected_again) const;
 

@@ -51,6 +51,15 @@ struct SolverOptions {
   double energy_limit = 0;  // largest relative error of the energy book before the run fails; 0: off
 };
 
+/// What takes motion away on the way to rest (src/solver/damping.cpp).
+struct DampingOptions {
+  double local = 0;    // Cundall's: share of a point's acceleration that works against its velocity
+  double viscous = 0;  // rate at which velocities fade [1/s]
+  bool relax = false;  // all motion is taken away whenever the kinetic energy has passed a peak
+  bool active() const { return local > 0 || viscous > 0 || relax; }
+  friend bool operator==(const DampingOptions&, const DampingOptions&) = default;
+};
+
 /// Overrides for one pair of materials. The name "wall" stands for wall faces.
 struct ContactPair {
   int material_a = 0, material_b = 0;  // indices of materials; -1: wall faces

@@ -2,10 +2,12 @@
 /// The case: everything a run needs, parsed, checked and with all defaults filled in (INTERFACE: docs/case-file.md).
 /// Vectors have three components whatever the dimension; z is 0 in 2D. SI units.
 
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,18 +24,37 @@ struct Domain {
   Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();  // [m]
   std::array<int, 3> cells = {1, 1, 1};
   std::array<bool, 3> periodic = {false, false, false};
-  Vec3 gravity = Vec3::Zero();  // [m/s2]
-  int patch_cells = 0;          // 32 in 2D, 16 in 3D unless given
+  MotionTable gravity;  // [m/s2]
+  int patch_cells = 0;  // 32 in 2D, 16 in 3D unless given
 };
 
 /// The shortest side of a cell [m].
 double smallest_cell(const Domain& domain);
+
+/// What ends a stage, or the run: any of what is given. Forces are means since the last look.
+struct Until {
+  static constexpr double never = std::numeric_limits<double>::infinity();
+  double time = never;                                     // simulated [s]
+  double duration = never;                                 // since the stage began [s]
+  std::string of;                                          // the tool that is meant, by its name
+  double strain = never, force = never, pressure = never;  // [-, N, Pa], in size
+  bool falls = false;                                      // force or pressure come down to that, not up
+  double length = 0, area = 0;                             // to which strain and pressure refer; 0: of the face
+  double packing = never;                                  // volume of bodies over that between the walls
+  double rest = 0;                                         // unbalanced_force below this; 0: not asked
+  int every = 10;                                          // steps between looks
+  bool given() const {
+    return std::isfinite(time) || std::isfinite(duration) || std::isfinite(strain) || std::isfinite(force) ||
+           std::isfinite(pressure) || std::isfinite(packing) || rest > 0;
+  }
+};
 
 struct Time {
   double end = std::numeric_limits<double>::infinity();  // [s]
   std::int64_t steps = std::numeric_limits<std::int64_t>::max();
   double cfl = 0.4;
   double dt = 0;          // fixed step [s]; 0: from cfl
+  Until until;            // what else ends the run
   double wall_limit = 0;  // wall time after which the run stops with a checkpoint [s]; 0: none
 };
 
@@ -53,6 +74,7 @@ struct BodySpec {
   Vec3 angular_velocity = Vec3::Zero();  // [rad/s] about the shape's centre
   double initial_pressure = 0;           // hydrostatic [Pa], positive in compression
   std::string group;
+  int insert = -1;     // comes with this of Case::inserts, not at the start
   std::string source;  // where it was defined, for messages: "case.toml:31" or "pack.csv:12"
 };
 
@@ -63,15 +85,39 @@ struct Drive {
   std::vector<int> ids;
   std::string group;
   MotionTable velocity;          // [m/s]
-  MotionTable angular_velocity;  // [rad/s] about each body's centre
+  MotionTable angular_velocity;  // [rad/s] about each body's centre, or about one point
+  std::optional<Vec3> about;     // that point at the start [m]
   Piston piston;
 };
 
 struct Face {
   FaceType type = FaceType::free;
-  Vec3 velocity = Vec3::Zero();       // of a fixed face or wall [m/s]
+  MotionTable velocity;               // of a fixed face or wall [m/s]
   double friction = 0;                // of a wall; may be infinite
   Leaving leaving = Leaving::remove;  // of a free face
+  std::optional<double> position;     // of a wall, along its normal, at the start [m]; else on the face
+  Piston piston;                      // of a wall, along its normal into the domain
+};
+
+/// A wall whose plane is not that of the domain's face, or will not be.
+bool moves(const Face& face, int number);
+
+/// Bodies that come into a running simulation, one after the other.
+struct Insert {
+  int first = 0, count = 0;                          // its bodies
+  bool drawn = false;                                // their centres are drawn from the region, else as they are given
+  Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();   // of that region, which holds whole bodies [m]
+  double start = 0, interval = 0;                    // time of the first, and between two at least [s]
+  std::uint64_t seed = 1;                            // of what is drawn
+  int every = 10;                                    // steps between attempts
+  std::string text;                                  // the entry as it was given, for case.toml
+};
+
+/// Bodies whose centres of mass lie in a region leave.
+struct Remove {
+  Shape region;
+  double start = 0, end = std::numeric_limits<double>::infinity();  // when [s]
+  int every = 50;                                                   // steps between looks
 };
 
 /// When an output is written; several conditions may be given, none means never.
@@ -96,6 +142,8 @@ struct CaseTable {
   std::uint64_t checksum = 0;  // of its bytes, as they were read (checksum.hpp)
 };
 
+struct RunStage;
+
 struct Case {
   std::string title;
   std::filesystem::path file;  // where it was read from; grain tables are relative to its folder
@@ -109,11 +157,23 @@ struct Case {
   std::vector<CrackSpec> cracks;
   CrackOptions crack;
   std::array<Face, 6> faces;
+  DampingOptions damping;
+  std::vector<Insert> inserts;
+  std::vector<Remove> removes;
+  std::vector<RunStage> stages;  // one after the other; none: one stage without a name
   Output output;
   ParallelOptions parallel;
   std::vector<std::string> warnings;
   std::string resolved;  // the text of case.toml: every default and override filled in, grain tables by their copies
   std::vector<CaseTable> tables;
+};
+
+/// A part of the run, with keys that change where it begins.
+struct RunStage {
+  std::string name;
+  Until until;
+  std::shared_ptr<const Case> changed;  // the case with all changes so far, without bodies
+  std::string set;                      // the changes as they were given, for case.toml
 };
 
 /// True where the drive selects the body, which has the number `index`.

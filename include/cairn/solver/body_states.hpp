@@ -24,12 +24,27 @@ struct BodyState {
 template <int Dim>
 std::vector<BodyState> body_states(const Simulation<Dim>& simulation);
 
-/// One pair of touching bodies.
+/// A piece's part of a vector of its body.
+struct PieceVector {
+  int body;
+  PatchId patch;
+  Vec3 value;
+};
+
+/// The sizes of the bodies' vectors, of this rank's share of those that have one. Collective.
+template <int Dim>
+std::vector<double> sizes_of_bodies(const Simulation<Dim>& simulation, const std::vector<PieceVector>& parts);
+
+/// One pair of touching bodies; b is -1 - face for walls.
 struct ContactState {
   int body_a = 0, body_b = 0;  // a < b
   Vec3 point = Vec3::Zero();   // weighted by the impulses [m]
   Vec3 normal = Vec3::Zero();  // unit, from a to b
   Vec3 force = Vec3::Zero();   // on a, averaged over the time since the contacts were last cleared [N]
+  Mat3 moment = Mat3::Zero();  // sum of force (x) position, likewise [N m]
+  double slip = 0;             // mean way slipped in that time, weighted by the impulses [m]
+  double friction_work = 0;    // in that time [J]
+  double sticking = 0;         // share of the impulses at nodes that stuck
 };
 
 /// Contacts of this rank's share of the bodies (by body_a), ascending in (a, b), averaged over `duration` [s].

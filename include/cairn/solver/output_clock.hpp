@@ -27,6 +27,12 @@ class OutputClock {
     if (schedule_.interval > 0 && intervals(time) > intervals(state_.last_time)) return true;
     return schedule_.interval_wall > 0 && wall - state_.last_wall >= schedule_.interval_wall;
   }
+  /// Whether it may be due after a step whose time is not known yet.
+  bool may_be_due(std::int64_t step) const {
+    return (schedule_.every > 0 && step % schedule_.every == 0) || schedule_.interval > 0 || schedule_.interval_wall > 0;
+  }
+  /// Goes by other intervals from now on.
+  void change(const Schedule& schedule) { schedule_ = schedule; }
   void written(std::int64_t step, double time, double wall) {
     skip(step, time, wall);
     ++state_.count;

@@ -23,6 +23,6 @@ struct RunSettings {
 /// Runs the case. Collective. Returns the exit code: 0 done, 4 stopped by a signal after a checkpoint.
 /// \throws InputError when the restart does not fit the case, RunError when the run fails (on every rank); RankError,
 /// or whatever set-up threw, on a rank that failed alone: then the others wait for it, and the job has to be ended.
-int run_case(const Case& c, const RunSettings& settings, MPI_Comm comm);
+int run_case(Case c, const RunSettings& settings, MPI_Comm comm);
 
 }  // namespace cairn

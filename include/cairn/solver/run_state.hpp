@@ -25,6 +25,8 @@ struct RunState {
   std::vector<double> cracks;              // Crack::state_size numbers for each
   std::vector<double> parts;               // bodies from which further ones were split off, in their order
   std::vector<double> spared;              // pairs of a crack and a body that it does not cut any more
+  std::vector<double> stage;               // of the StageKeeper
+  std::vector<double> pouring;             // of the simulation
   std::vector<double> tools;               // tool_state_size numbers for each: travel, velocity, spin, speed
 };
 
@@ -32,6 +34,7 @@ struct RunState {
 /// first.
 template <class State, class F>
 void for_each_number(State& s, F&& f) {
+  f("kinetic", s.step.kinetic[0]), f("kinetic_before", s.step.kinetic[1]);
   f("dt", s.step.dt), f("wave_speed", s.step.wave_speed), f("point_speed", s.step.point_speed);
   const auto clock = [&](const std::string& name, auto& c) {
     f(name + "_last_step", c.last_step), f(name + "_last_time", c.last_time);

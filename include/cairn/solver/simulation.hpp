@@ -40,7 +40,7 @@ struct Totals : PatchLedger {
   double mass = 0, deformable_mass = 0;                        // [kg]
   double energy() const {
     return kinetic + strain + potential + plastic + viscous + crack_energy + crack_dissipation + contact_dissipation +
-           numerical + filtered + energy_left - boundary_work;
+           numerical + filtered + damped + energy_left - boundary_work;
   }
 };
 
@@ -49,12 +49,22 @@ struct StepState {
   double time = 0, dt = 0;                 // dt: of the last step [s]
   double wave_speed = 0, point_speed = 0;  // largest over all points, for the next dt [m/s]
   std::int64_t steps = 0;
+  std::array<double, 2> kinetic{};  // energy after the last two steps, while bodies relax [J]
 };
 
 /// What ranks tell each other along with the speeds; the largest of each counts. It costs no communication of its own.
 struct Notice {
   double stop = 0;  // a reason to stop, above 0
   double wall = 0;  // a wall time [s]
+};
+
+/// How far from equilibrium the deformable bodies are.
+struct ForceBalance {
+  double net = 0, largest_net = 0;  // sum over them of |net force|, and the largest [N]
+  double pressing = 0;              // sum over them of the sizes of contact forces at their nodes [N]
+  std::int64_t bodies = 0;
+  double mean() const { return pressing > 0 ? net / pressing : 0; }
+  double largest() const { return pressing > 0 ? largest_net * static_cast<double>(bodies) / pressing : 0; }
 };
 
 /// A crack's tip and what drives it.
@@ -128,6 +138,24 @@ class Simulation {
   /// Bodies from which further ones were split off, in their order, and pairs of a crack and a body that it parted.
   const std::vector<double>& parts() const { return parts_; }
   std::vector<double> spared() const;
+  /// The impulse on a tool since the start [N s], the same on every rank. Collective.
+  std::vector<double> impulse_on(int tool) const;
+  /// Of a face, between the other faces where they stand; in 2D for each metre of thickness [m2].
+  double face_area(int face) const;
+  /// From a face to the opposite one, where they stand [m].
+  double face_distance(int face) const;
+  /// Volume of all bodies over that between the faces. Collective.
+  double packing_fraction() const;
+  /// Has the steps from now on weigh forces for force_balance().
+  void keep_balance(bool keep) { keep_balance_ = keep; }
+  /// Of the last step, the same on every rank.
+  const ForceBalance& force_balance() const { return balance_; }
+  /// Where pouring stands: the next point's number, and for each [[insert]] how many of its bodies came, how often a place
+  /// was drawn, and when the next body may come [s].
+  std::vector<double> pouring() const;
+  /// Goes on with what a stage changes: motions of tools, gravity, friction, damping, the length of steps, and what is
+  /// kept for output. Collective.
+  void change(const Case& c);
   /// Their states, tool_state_size numbers for each.
   std::vector<double> tool_states() const;
   const PatchTable<Dim>& table() const { return table_; }
@@ -184,8 +212,28 @@ class Simulation {
   void push_pistons();  // communicates where there are some
   void end_tools();
   void set_velocities_of_tools();
+  void keep_what_is_asked(const Case& c);
+  void aim_walls();
+  void place_walls();
+  void pull_by(const Vec3& gravity);
+
+  // Bodies that come and go (pour.cpp).
+  void define_pouring(const Case& c);
+  void insert_bodies();  // communicates, where there are some to come
+  void remove_bodies();  // likewise
+  bool has_room(const Shape& shape) const;
+  void place_body(int body, const Shape& shape);
+  void restore_pouring(const std::vector<double>& state);
+
+  // What takes motion away, and what is left over of forces (damping.cpp).
+  void weigh_forces(Patch<Dim>& patch);
+  ForceBalance weigh_bodies() const;  // communicates
+  void damp(Patch<Dim>& patch, Piece<Dim>& piece);
+  void relax();  // communicates, where it is asked for
   void restore_tools(const std::vector<double>& states);
-  std::vector<double> tool_records(bool pistons) const;
+  /// Sums of this rank's patches over the tools that are wanted.
+  template <class Wanted>
+  std::vector<double> tool_records(Wanted&& wanted) const;
 
   void place_points(const Case& c);
   void restore(const Checkpoint& from);
@@ -325,6 +373,19 @@ class Simulation {
   std::vector<Tool> tools_;
   std::vector<int> moved_bodies_;  // of tools whose velocity changes
   bool has_pistons_ = false;
+  Case pouring_;  // of the case, what placing a body asks for, and the bodies that come; elsewhere nothing
+  struct Pouring {
+    int placed = 0, drawn = 0;
+    double next = 0;
+  };
+  std::vector<Pouring> poured_;  // of each [[insert]]
+  int first_poured_ = 0;         // body
+  std::int64_t next_id_ = 0;     // of points
+  MotionTable gravity_;
+  DampingOptions damping_;
+  bool keep_balance_ = false;
+  ForceBalance balance_;
+  std::array<double, 2> kinetic_{};  // StepState::kinetic, the latest first
   std::vector<Patch<Dim>> patches_;
   PatchTable<Dim> table_;
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
