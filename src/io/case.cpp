@@ -24,8 +24,9 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   read_contact(root.table("contact"), c.materials, c.contact);
   read_bodies(root, draft, errors);
   read_grains(root, draft, errors);
-  if (!root.has("bodies") && !root.has("grains"))
-    root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
+  read_labels(root, draft, errors);
+  if (!root.has("bodies") && !root.has("grains") && !root.has("labels"))
+    root.missing("bodies", "no body is given; give at least one [[bodies]], [[grains]] or [[labels]]");
   read_drives(root, draft);
   read_cracks(root, draft);
   check_pressures(draft, errors);
@@ -34,7 +35,7 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   read_output(root.table("output"), draft, c.output);
   root.finish();
   if (errors.count() == 0 && c.bodies.empty())
-    root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
+    root.missing("bodies", "no body is given; give at least one [[bodies]], [[grains]] or [[labels]]");
   errors.throw_if_any();
   check_points(c, errors);
   check_time_step(c, errors);
