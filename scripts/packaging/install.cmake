@@ -9,8 +9,9 @@ foreach(level IN LISTS levels)
   endif()
 endforeach()
 install(PROGRAMS scripts/plot scripts/measure scripts/view scripts/report scripts/export scripts/paraview scripts/python
-        scripts/compare-runs scripts/convert-grains DESTINATION libexec/cairn)
-install(DIRECTORY scripts/plotting scripts/measuring DESTINATION libexec/cairn FILES_MATCHING PATTERN *.py PATTERN viewer*)
+        scripts/compare-runs scripts/convert-grains scripts/convert-labels DESTINATION libexec/cairn)
+install(DIRECTORY scripts/plotting scripts/measuring scripts/converting DESTINATION libexec/cairn
+        FILES_MATCHING PATTERN *.py PATTERN viewer*)
 install(DIRECTORY cases DESTINATION share/cairn)
 install(DIRECTORY docs/ DESTINATION share/doc/cairn FILES_MATCHING PATTERN *.md PATTERN *.png)
 install(FILES README.md LICENSE ARCHITECTURE.md CONTRIBUTING.md DESTINATION share/doc/cairn)

@@ -120,6 +120,40 @@ void warn_of_memory(double bytes, int ranks) {
                      size_text(bytes), size_text(free))});
 }
 
+std::string bounds_text(const Bounds& b, int dimension) {
+  std::string lower, upper;
+  for (int k = 0; k < dimension; ++k) {
+    lower += fmt::format("{}{:.4g}", k ? ", " : "", b.lower[k]);
+    upper += fmt::format("{}{:.4g}", k ? ", " : "", b.upper[k]);
+  }
+  return fmt::format("[{}] to [{}]", lower, upper);
+}
+
+/// What the case file does not show of shapes that come from files: size, place, and how well the cells resolve them.
+void print_shapes(const Case& c) {
+  constexpr int most = 10;  // said one by one
+  const double cell = smallest_cell(c.domain);
+  const char* unit = c.domain.dimension == 2 ? "m2" : "m3";
+  int shown = 0, labels = 0;
+  double least = 0, largest = 0, thinnest = 0;
+  for (std::size_t i = 0; i < c.bodies.size(); ++i) {
+    const Shape& shape = c.bodies[i].shape;
+    const double volume = known_volume(shape), width = smallest_width(shape) / cell;
+    if (volume < 0) continue;
+    if (std::holds_alternative<LabelBody>(shape)) {
+      least = labels ? std::min(least, volume) : volume, largest = std::max(largest, volume);
+      thinnest = labels++ ? std::min(thinnest, width) : width;
+    } else if (shown++ < most) {
+      fmt::print("  body {:<5} volume {:.6g} {}, {}, thinnest part {:.3g} cells\n", i, volume, unit,
+                 bounds_text(bounds(shape), c.domain.dimension), width);
+    }
+  }
+  if (shown > most) fmt::print("             ... and {} more from files\n", shown - most);
+  if (labels > 0)
+    fmt::print("  labels     {} bodies, volumes {:.4g} to {:.4g} {}, the thinnest {:.3g} cells across\n", labels, least,
+               largest, unit, thinnest);
+}
+
 void print_summary(const Case& c) {
   const Domain& d = c.domain;
   int ranks = 1;
@@ -136,6 +170,7 @@ void print_summary(const Case& c) {
   fmt::print("  cells      {}\n", cells);
   fmt::print("  bodies     {} of {} material{}\n", c.bodies.size(), c.materials.size(),
              c.materials.size() == 1 ? "" : "s");
+  print_shapes(c);
   fmt::print("  points     about {:.0f}\n", e.points);
   fmt::print("  memory     about {} in all{}\n", size_text(e.bytes),
              ranks > 1 ? fmt::format(" on {} ranks", ranks) : "");

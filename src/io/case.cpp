@@ -24,9 +24,10 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   read_contact(root.table("contact"), c.materials, c.contact);
   read_bodies(root, draft, errors);
   read_grains(root, draft, errors);
+  read_labels(root, draft, errors);
   read_pouring(root, draft, errors);
-  if (!root.has("bodies") && !root.has("grains") && !root.has("insert"))
-    root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
+  if (!root.has("bodies") && !root.has("grains") && !root.has("labels") && !root.has("insert"))
+    root.missing("bodies", "no body is given; give at least one [[bodies]], [[grains]] or [[labels]]");
   read_drives(root, draft);
   read_cracks(root, draft);
   check_pressures(draft, errors);
@@ -37,7 +38,7 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
   read_stages(tree, root, draft, errors);
   root.finish();
   if (errors.count() == 0 && c.bodies.empty())
-    root.missing("bodies", "no body is given; give at least one [[bodies]] or [[grains]]");
+    root.missing("bodies", "no body is given; give at least one [[bodies]], [[grains]] or [[labels]]");
   errors.throw_if_any();
   check_walls(c, errors);
   check_points(c, errors);

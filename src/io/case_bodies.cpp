@@ -8,6 +8,7 @@
 #include "cairn/material/registry.hpp"
 #include "case_names.hpp"
 #include "case_sections.hpp"
+#include "shape_copies.hpp"
 
 namespace cairn::reading {
 namespace {
@@ -158,6 +159,33 @@ void read_materials(Table materials, int dimension, std::vector<Material>& resul
   if (result.empty()) materials.missing("", "no material is given; give at least one table [materials.NAME]");
 }
 
+CommonSpec read_common(Table& table, const Draft& draft) {
+  const int dimension = draft.result.domain.dimension;
+  CommonSpec spec;
+  spec.material = read_material_name(table, draft.result.materials, false);
+  spec.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
+  spec.angular_velocity = read_angular_velocity(table, dimension);
+  spec.initial_pressure = table.number("initial_pressure", 0.0);
+  spec.group = table.text("group", "");
+  return spec;
+}
+
+std::filesystem::path path_of_file(const std::string& name, Table& table, const Draft& draft, std::string_view key) {
+  const std::filesystem::path path = (draft.result.file.parent_path() / name).lexically_normal();
+  std::error_code status;
+  if (std::filesystem::exists(path, status)) return path;
+  table.error(key, fmt::format("there is no file {}; the name is relative to the folder of the case file",
+                               in_quotes(path.string())));
+  return {};
+}
+
+std::string add_copy(std::vector<CaseTable>& tables, const std::filesystem::path& file, std::uint64_t checksum) {
+  const std::string name = copy_name(file, checksum);
+  if (std::ranges::find(tables, name, &CaseTable::copy) == tables.end())
+    tables.push_back({std::filesystem::absolute(file).lexically_normal(), name, checksum, false});
+  return name;
+}
+
 void read_bodies(Table& root, Draft& draft, Errors& errors) {
   const Domain& domain = draft.result.domain;
   for (Table& table : root.tables("bodies")) {
@@ -167,7 +195,7 @@ void read_bodies(Table& root, Draft& draft, Errors& errors) {
     if (!table.has("shape"))
       table.missing("shape", "is missing; give a table such as { type = \"disk\", centre = [0, 0], radius = 1 }");
     if (Table shape = table.table("shape"); shape.present()) {
-      if (auto read = read_shape(shape, domain.dimension, errors)) {
+      if (auto read = read_shape(shape, draft, errors)) {
         body.shape = std::move(*read);
         const std::string problem = draft.domain_known ? placement_problem(body.shape, domain) : "";
         if (!problem.empty()) table.error("shape", problem);
@@ -185,29 +213,18 @@ void read_bodies(Table& root, Draft& draft, Errors& errors) {
 }
 
 GrainsSpec read_grains_spec(Table& table, Draft& draft) {
-  const int dimension = draft.result.domain.dimension;
-  GrainsSpec spec;
-  spec.material = read_material_name(table, draft.result.materials, false);
-  spec.velocity = table.vector("velocity", dimension, Vec3::Zero().eval());
-  spec.angular_velocity = read_angular_velocity(table, dimension);
-  spec.initial_pressure = table.number("initial_pressure", 0.0);
-  spec.group = table.text("group", "");
+  GrainsSpec spec{read_common(table, draft), {}, {}, {}};
   if (!table.has("file")) return spec;
   const std::string name = table.text("file", std::nullopt);
   if (name.empty()) {
     if (table.find("file")->is_string()) table.error("file", "is empty; name a grain table");
-    draft.bodies_known = false;
-    return spec;
+  } else {
+    spec.given = path_of_file(name, table, draft);
   }
-  const std::filesystem::path path = (draft.result.file.parent_path() / name).lexically_normal();
-  std::error_code status;
-  if (!std::filesystem::exists(path, status)) {
-    table.error("file", fmt::format("there is no file {}; the name is relative to the folder of the case file",
-                                    in_quotes(path.string())));
+  if (spec.given.empty())
     draft.bodies_known = false;
-    return spec;
-  }
-  spec.given = path, spec.file = std::filesystem::absolute(path).lexically_normal();
+  else
+    spec.file = std::filesystem::absolute(spec.given).lexically_normal();
   return spec;
 }
 

@@ -54,21 +54,35 @@ struct ShapeSum {
   Checksum& sum;
   void add(double value) const { sum.add_values(std::span<const double>(&value, 1)); }
   void add(const Vec3& v) const { sum.add_values(std::span<const double>(v.data(), 3)); }
-  void operator()(const Ball& s) const { add(s.centre), add(s.radius); }
-  void operator()(const BoxShape& s) const { add(s.lower), add(s.upper), add(s.angle); }
-  void operator()(const Ellipsoid& s) const { add(s.centre), add(s.radii), add(s.angle); }
-  void operator()(const Polygon& s) const {
-    for (const Vec3& p : s.points) add(p);
+  void add(const std::string& text) const { sum.add_values(std::span(text.data(), text.size())); }
+  void vector(std::string_view, const Vec3& v) const { add(v); }
+  void positive(std::string_view, const Vec3& v) const { add(v); }
+  void positive(std::string_view, double value) const { add(value); }
+  void not_negative(std::string_view, double value) const { add(value); }
+  void angle(std::string_view, double value) const { add(value); }
+  void vectors(std::string_view, const std::vector<Vec3>& list) const {
+    for (const Vec3& p : list) add(p);
   }
-  void operator()(const Cylinder& s) const { add(s.from), add(s.to), add(s.radius); }
-  void operator()(const HalfSpace& s) const { add(s.point), add(s.normal); }
-  void operator()(const Compound& s) const {
-    add(static_cast<double>(s.operation)), add(static_cast<double>(s.of.size()));
-    for (const Shape& part : s.of) all(part);
+  void text(std::string_view, const std::string& value) const { add(value); }
+  void file(std::string_view, const ShapeFile& file) const { plain(file.checksum); }
+  void placement(const Placement& p) const { add(p.factor()), add(p.move), add(p.rotate); }
+  void plain(const Vec3& v) const { add(v); }
+  template <class T>
+  void plain(T value) const {
+    sum.add_values(std::span<const T>(&value, 1));
   }
   void all(const Shape& shape) const {
     add(static_cast<double>(shape.index()));
-    std::visit(*this, shape);
+    std::visit(
+        [&]<class S>(const S& s) {
+          if constexpr (std::is_same_v<S, Compound>) {
+            add(static_cast<double>(s.operation)), add(static_cast<double>(s.of.size()));
+            for (const Shape& part : s.of) all(part);
+          } else {
+            S::list(s, *this);
+          }
+        },
+        shape);
   }
 };
 
@@ -99,8 +113,9 @@ Freedom freedom_of(const std::string& key) {
        {"title", "time.end", "time.steps", "time.wall_limit", "solver.energy_limit", "solver.lost_points"})
     if (key == free) return Freedom::free;
   if (starts("output.") || starts("parallel.")) return Freedom::free;
-  // A table may have moved: whether its content is the same, bodies_checksum says.
-  if (starts("grains.") && key.ends_with(".file")) return Freedom::free;
+  // A file may have moved: whether its content is the same, bodies_checksum says.
+  for (const char* from : {"grains.", "labels.", "bodies."})
+    if (starts(from) && key.ends_with(".file")) return Freedom::free;
   return Freedom::on_demand;
 }
 

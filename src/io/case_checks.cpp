@@ -251,9 +251,24 @@ bool holds_cut_site(const Shape& shape, const Vec3& shift, const Case& c, int pe
   return found;
 }
 
+/// A label's largest ball holds a whole site, whichever: its voxels need not be read to know.
+bool holds_surely(const Shape& shape, const Vec3& shift, const Case& c, int per) {
+  const auto* label = std::get_if<LabelBody>(&shape);
+  if (!label) return false;
+  Vec3 diagonal = Vec3::Zero();
+  const Vec3 middle = label->middle() + shift;
+  const Domain& d = c.domain;
+  for (int k = 0; k < d.dimension; ++k) {
+    diagonal[k] = (d.upper[k] - d.lower[k]) / d.cells[k] / per;
+    if (middle[k] < d.lower[k] + diagonal[k] || middle[k] > d.upper[k] - diagonal[k]) return false;
+  }
+  return label->inner_radius() > 2 * diagonal.norm();
+}
+
 /// Whether a run would place a point in a shape that is moved by `shift`.
 bool holds_point(const Shape& shape, const Vec3& shift, const Case& c, std::int64_t& sites) {
   const int dim = c.domain.dimension, per = points_per_side(c);
+  if (holds_surely(shape, shift, c, per)) return true;
   double smallest = std::numeric_limits<double>::infinity();
   for (int k = 0; k < dim; ++k)
     smallest = std::min(smallest, (c.domain.upper[k] - c.domain.lower[k]) / c.domain.cells[k]);

@@ -138,7 +138,7 @@ void apply(toml::table& root, const Override& change, Errors& errors) {
 
 }  // namespace
 
-std::string read_text(const std::filesystem::path& file, std::string_view what) {
+std::string read_bytes(const std::filesystem::path& file, std::string_view what) {
   const auto fail = [&](std::string_view text) {
     throw InputError(fmt::format("{}: {}", shortened(file.string()), text));
   };
@@ -153,7 +153,14 @@ std::string read_text(const std::filesystem::path& file, std::string_view what) 
   std::ostringstream text;
   text << stream.rdbuf();
   if (stream.bad()) fail("cannot be read to its end");
-  std::string content = std::move(text).str();
+  return std::move(text).str();
+}
+
+std::string read_text(const std::filesystem::path& file, std::string_view what) {
+  const auto fail = [&](std::string_view text) {
+    throw InputError(fmt::format("{}: {}", shortened(file.string()), text));
+  };
+  std::string content = read_bytes(file, what);
   if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF"))
     fail(fmt::format("is text in UTF-16, as its first two bytes say; save it as UTF-8; {} is needed", what));
   if (content.find('\0') != std::string::npos) fail(fmt::format("is not a text file; {} is needed", what));

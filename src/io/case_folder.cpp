@@ -41,7 +41,7 @@ fs::path input_at(const Case& c, const fs::path& target) {
   return {};
 }
 
-/// Copies a table behind a line that says so, and sees to it that it is the table that was read.
+/// Copies a table behind a line that says so, or a file as it is, and sees to it that it is the table that was read.
 std::string copy_table(const CaseTable& table, const fs::path& target) {
   const fs::path temporary = temporary_name(target);
   const PosixFile in(table.file, O_RDONLY);
@@ -60,8 +60,8 @@ std::string copy_table(const CaseTable& table, const fs::path& target) {
     std::string_view bytes(buffer.data(), static_cast<std::size_t>(count));
     sum.add_values(std::span(bytes.data(), bytes.size()));
     std::string head;
-    if (at == 0 && bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
-    if (at == 0 && !bytes.starts_with(table_mark))
+    if (at == 0 && table.marked && bytes.starts_with(byte_order_mark)) bytes.remove_prefix(byte_order_mark.size());
+    if (at == 0 && table.marked && !bytes.starts_with(table_mark))
       head = fmt::format("{}{}\n", table_mark, printable(table.file.filename().string()));
     if (!out.write(head.data(), std::ssize(head), written) ||
         !out.write(bytes.data(), std::ssize(bytes), written + std::ssize(head)))

@@ -1,5 +1,5 @@
-// Grain tables: CSV with a header line, columns x, y[, z], r[, material][, group] in any order; '#' starts a comment
-// line.
+// Grain tables: CSV with a header line, columns x, y[, z], r[, vx, vy[, vz]][, material][, group][, clump] in any order;
+// '#' starts a comment line. Rows of one clump are one body.
 
 #include <fmt/format.h>
 
@@ -7,6 +7,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <map>
 
 #include "cairn/core/error.hpp"
 #include "cairn/core/memory.hpp"
@@ -18,8 +19,9 @@ namespace {
 
 constexpr std::size_t most_errors = 20;  // reported for one table
 
-enum Column { x, y, z, r, material, group, column_count };
-constexpr std::string_view column_names[column_count] = {"x", "y", "z", "r", "material", "group"};
+enum Column { x, y, z, r, vx, vy, vz, material, group, clump, column_count };
+constexpr std::string_view column_names[column_count] = {"x",  "y",        "z",     "r",    "vx", "vy",
+                                                         "vz", "material", "group", "clump"};
 
 std::string_view trimmed(std::string_view s) {
   const auto first = s.find_first_not_of(" \t\r");
@@ -56,13 +58,17 @@ class GrainTable {
         read_row();
       }
     }
+    check_clumps();
     if (width_ == 0) return problem("", "there is no header line; the first line must be " + header());
     if (rows_ == 0) problem("", "holds no grains; give at least one row " + header());
     if (found_ > most_errors) errors_.add({name_, 0}, "", fmt::format("... and {} more", found_ - most_errors));
   }
 
  private:
-  std::string header() const { return dimension_ == 2 ? "x,y,r[,material][,group]" : "x,y,z,r[,material][,group]"; }
+  std::string header() const {
+    return dimension_ == 2 ? "x,y,r[,vx,vy][,material][,group][,clump]"
+                           : "x,y,z,r[,vx,vy,vz][,material][,group][,clump]";
+  }
 
   void problem(std::string_view key, std::string_view text) {
     if (++found_ <= most_errors) errors_.add({name_, std::max<std::int64_t>(line_, 1)}, key, text);
@@ -83,7 +89,12 @@ class GrainTable {
       }
     }
     if (found_ != before) return false;
-    if (dimension_ == 2 && position_[z] >= 0) problem("z", "this column belongs to 3D; the header must be " + header());
+    for (const Column c : {z, vz})
+      if (dimension_ == 2 && position_[c] >= 0)
+        problem(column_names[c], "this column belongs to 3D; the header must be " + header());
+    const int speeds = (position_[vx] >= 0) + (position_[vy] >= 0) + (position_[vz] >= 0);
+    if (speeds != 0 && speeds != dimension_)
+      problem("vx", "a velocity needs all its columns; the header must be " + header());
     for (const Column c : {x, y, z, r})
       if (position_[c] < 0 && (c != z || dimension_ == 3))
         problem(column_names[c], "this column is missing; the header must be " + header());
@@ -133,15 +144,41 @@ class GrainTable {
       body.group = word(group).empty() ? spec_.group : std::string(word(group));
     }
     body.shape = ball;
-    if (found_ == before && draft_.domain_known) {
+    body.velocity = spec_.velocity;
+    if (found_ == before && position_[vx] >= 0)
+      body.velocity = {number(vx, any_finite), number(vy, any_finite), dimension_ == 3 ? number(vz, any_finite) : 0.0};
+    const std::string together(word(clump));
+    if (found_ == before && together.empty() && draft_.domain_known) {
       const std::string misplaced = placement_problem(body.shape, draft_.result.domain);
       if (!misplaced.empty()) problem("", misplaced);
     }
-    body.velocity = spec_.velocity;
+    if (found_ == before && !together.empty() && joined(together, body)) return;
     body.angular_velocity = spec_.angular_velocity;
     body.initial_pressure = spec_.initial_pressure;
     body.source = name_ + ":" + std::to_string(line_);
     draft_.result.bodies.push_back(std::move(body));
+  }
+
+  /// Adds the ball to the body of its clump; false where it is the first of it.
+  bool joined(const std::string& together, const BodySpec& body) {
+    const auto [entry, fresh] = clumps_.try_emplace(together, draft_.result.bodies.size());
+    if (fresh) return false;
+    BodySpec& first = draft_.result.bodies[entry->second];
+    if (first.material != body.material || first.velocity != body.velocity)
+      problem("clump", fmt::format("has another material or velocity than the first row of its clump, {}", first.source));
+    if (!std::holds_alternative<Compound>(first.shape))
+      first.shape = Compound{CompoundOperation::union_of, {first.shape}};
+    std::get<Compound>(first.shape).of.push_back(body.shape);
+    return true;
+  }
+
+  /// Clumps can be looked at only when they are whole.
+  void check_clumps() {
+    if (!draft_.domain_known) return;
+    for (const auto& [together, body] : clumps_) {
+      const std::string misplaced = placement_problem(draft_.result.bodies[body].shape, draft_.result.domain);
+      if (!misplaced.empty()) problem("clump", fmt::format("{}: {}", in_quotes(together), misplaced));
+    }
   }
 
   std::string name_;
@@ -152,6 +189,7 @@ class GrainTable {
   std::int64_t line_ = 0;
   std::size_t width_ = 0, rows_ = 0, found_ = 0;
   int position_[column_count] = {};
+  std::map<std::string, std::size_t> clumps_;  // where their bodies are
   std::vector<std::string_view> cells_;
 };
 

@@ -85,7 +85,7 @@ void add_bodies(Table& table, Draft& draft, Errors& errors, Insert& insert) {
   std::vector<Shape> shapes;
   if (ball) {
     shapes = read_balls(table, count, insert);
-  } else if (auto read = read_shape(table.table("shape"), domain.dimension, errors)) {
+  } else if (auto read = read_shape(table.table("shape"), draft, errors)) {
     shapes.assign(count, *read);
   }
   for (const Shape& s : shapes) {
@@ -133,7 +133,7 @@ void read_pouring(Table& root, Draft& draft, Errors& errors) {
     Remove remove;
     if (!table.has("region")) table.missing("region", "is missing; give a shape");
     if (Table region = table.table("region"); region.present())
-      if (auto shape = read_shape(region, c.domain.dimension, errors)) remove.region = *shape;
+      if (auto shape = read_shape(region, draft, errors)) remove.region = *shape;
     remove.start = table.number("start", 0.0, not_negative);
     if (table.has("end")) remove.end = table.number("end", std::nullopt, not_negative);
     remove.every = static_cast<int>(table.integer("every", remove.every, 1, 1'000'000));

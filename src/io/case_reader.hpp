@@ -159,6 +159,9 @@ std::string_view name_of(const Named<E> (&names)[N], E value) {
   return names[0].name;
 }
 
+/// Reads a whole file of up to 4 GiB. \throws InputError where it cannot be read.
+std::string read_bytes(const std::filesystem::path& file, std::string_view what);
+
 /// Reads a whole text file. \throws InputError when it is not a readable text file.
 std::string read_text(const std::filesystem::path& file, std::string_view what);
 

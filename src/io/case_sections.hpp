@@ -1,18 +1,33 @@
 #pragma once
 /// The sections of the case file, one function each. All report errors through their table and go on.
 
+#include <map>
+#include <memory>
+
 #include "case_reader.hpp"
 
 namespace cairn::reading {
 
-/// One [[grains]] entry: a table of balls and what they share.
-struct GrainsSpec {
-  std::filesystem::path given, file;  // as the case has it, and absolute; empty where there is none
-  std::string copy;            // its name beside the results
-  int material = -1;           // -1: every row names its own
+/// What the bodies of a table share.
+struct CommonSpec {
+  int material = -1;  // -1: every row names its own
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
   double initial_pressure = 0;
   std::string group;
+};
+
+/// One [[grains]] entry: a table of balls and what they share.
+struct GrainsSpec : CommonSpec {
+  std::filesystem::path given, file;  // as the case has it, and absolute; empty where there is none
+  std::string copy;            // its name beside the results
+};
+
+/// One [[labels]] entry.
+struct LabelsSpec {
+  CommonSpec common;
+  Placement placement;
+  std::string copy, table;  // names of the copies beside the results
+  std::uint64_t checksum = 0;
 };
 
 /// A case while it is read.
@@ -23,6 +38,8 @@ struct Draft {
   std::size_t shaped_bodies = 0;   // bodies from [[bodies]]; the rest come from the tables
   std::vector<GrainsSpec> grains;  // in order
   std::vector<std::string> inserted_tables;  // for each [[insert]] the copy of its table; empty where it has none
+  std::vector<LabelsSpec> labels;
+  std::map<std::string, std::shared_ptr<const Solid>> solids;  // that were read, by what they are made of
 };
 
 void read_domain(Table domain, Domain& result);
@@ -37,7 +54,9 @@ void read_parallel(Table parallel, ParallelOptions& result);
 void read_output(Table output, const Draft& draft, Output& result);
 void read_materials(Table materials, int dimension, std::vector<Material>& result);
 /// The shape a table describes; nothing after an error.
-std::optional<Shape> read_shape(Table table, int dimension, Errors& errors);
+std::optional<Shape> read_shape(Table table, Draft& draft, Errors& errors);
+/// Unit, scale, move and rotate.
+Placement read_placement(Table& table, int dimension);
 void read_bodies(Table& root, Draft& draft, Errors& errors);
 void read_grains(Table& root, Draft& draft, Errors& errors);
 /// [[insert]] and [[remove]]; after all other bodies.
@@ -46,6 +65,7 @@ void read_pouring(Table& root, Draft& draft, Errors& errors);
 GrainsSpec read_grains_spec(Table& table, Draft& draft);
 /// Appends the bodies of a table; returns the name of its copy.
 std::string read_table(const GrainsSpec& spec, Draft& draft, Errors& errors);
+void read_labels(Table& root, Draft& draft, Errors& errors);
 void read_drives(Table& root, Draft& draft);
 /// time.until and [[stage]], of a case that is right without them.
 void read_stages(const toml::table& tree, Table& root, Draft& draft, Errors& errors);
@@ -59,6 +79,14 @@ void read_cracks(Table& root, Draft& draft);
 void read_grain_cracks(Table table, const CrackSpec& crack, Draft& draft);
 /// The keys of one of them for its faces and its growth; after its ends.
 void read_crack_law(Table& table, CrackSpec& crack);
+
+/// Material, velocities, pressure and group of the bodies of a table.
+CommonSpec read_common(Table& table, const Draft& draft);
+/// The file that a key names, relative to the case's; empty, and an error at the key, where there is none.
+std::filesystem::path path_of_file(const std::string& name, Table& table, const Draft& draft,
+                                   std::string_view key = "file");
+/// The name of a file's copy beside the results; a file that is read twice has one.
+std::string add_copy(std::vector<CaseTable>& tables, const std::filesystem::path& file, std::uint64_t checksum);
 
 /// Appends the balls of a grain table; returns the checksum of its bytes.
 std::uint64_t read_grain_table(const std::filesystem::path& file, const GrainsSpec& spec, Draft& draft, Errors& errors);

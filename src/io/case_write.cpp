@@ -50,40 +50,50 @@ std::string key_of(std::string_view name) {
   return !name.empty() && std::ranges::all_of(name, bare) ? std::string(name) : text_of(name);
 }
 
-/// Writes the shapes: `dim` decides the names and the length of vectors.
-struct ShapeWriter {
+std::string text_of(const Shape& shape, int dim);
+
+/// Writes the keys of a shape; the dimension decides the length of vectors.
+struct KeyWriter {
   int dim;
-  std::string vec(const Vec3& v) const { return list_of(v, dim); }
-  std::string operator()(const Ball& s) const {
-    return fmt::format("{{ type = \"{}\", centre = {}, radius = {} }}", dim == 2 ? "disk" : "sphere", vec(s.centre),
-                       text_of(s.radius));
+  std::string all;
+  void add(std::string_view key, const std::string& value) {
+    all += fmt::format("{}{} = {}", all.empty() ? "" : ", ", key, value);
   }
-  std::string operator()(const BoxShape& s) const {
-    return fmt::format("{{ type = \"box\", lower = {}, upper = {}, angle = {} }}", vec(s.lower), vec(s.upper),
-                       text_of(s.angle));
-  }
-  std::string operator()(const Ellipsoid& s) const {
-    return fmt::format("{{ type = \"{}\", centre = {}, radii = {}, angle = {} }}", dim == 2 ? "ellipse" : "ellipsoid",
-                       vec(s.centre), vec(s.radii), text_of(s.angle));
-  }
-  std::string operator()(const Polygon& s) const {
+  void vector(std::string_view key, const Vec3& v) { add(key, list_of(v, dim)); }
+  void positive(std::string_view key, const Vec3& v) { add(key, list_of(v, dim)); }
+  void positive(std::string_view key, double value) { add(key, text_of(value)); }
+  void not_negative(std::string_view key, double value) { add(key, text_of(value)); }
+  void angle(std::string_view key, double value) { add(key, text_of(value)); }
+  void vectors(std::string_view key, const std::vector<Vec3>& list) {
     std::string points;
-    for (const Vec3& p : s.points) points += (points.empty() ? "" : ", ") + vec(p);
-    return fmt::format("{{ type = \"polygon\", points = [{}] }}", points);
+    for (const Vec3& p : list) points += (points.empty() ? "" : ", ") + list_of(p, dim);
+    add(key, "[" + points + "]");
   }
-  std::string operator()(const Cylinder& s) const {
-    return fmt::format("{{ type = \"cylinder\", from = {}, to = {}, radius = {} }}", vec(s.from), vec(s.to),
-                       text_of(s.radius));
-  }
-  std::string operator()(const HalfSpace& s) const {
-    return fmt::format("{{ type = \"half_space\", point = {}, normal = {} }}", vec(s.point), vec(s.normal));
-  }
-  std::string operator()(const Compound& s) const {
-    std::string parts;
-    for (const Shape& part : s.of) parts += (parts.empty() ? "" : ", ") + std::visit(*this, part);
-    return fmt::format("{{ type = \"{}\", of = [{}] }}", name_of(compound_names, s.operation), parts);
+  void text(std::string_view key, const std::string& value) { add(key, text_of(value)); }
+  void file(std::string_view key, const ShapeFile& f) { add(key, text_of(f.copy)); }
+  void placement(const Placement& p) {
+    add("unit", text_of(p.unit)), add("scale", text_of(p.scale)), vector("move", p.move);
+    add("rotate", dim == 3 ? list_of(p.rotate, 3) : text_of(p.rotate.z()));
   }
 };
+
+std::string text_of(const Shape& shape, int dim) {
+  return std::visit(
+      [&]<class S>(const S& s) -> std::string {
+        if constexpr (std::is_same_v<S, Compound>) {
+          std::string parts;
+          for (const Shape& part : s.of) parts += (parts.empty() ? "" : ", ") + text_of(part, dim);
+          return fmt::format("{{ type = \"{}\", of = [{}] }}", name_of(compound_names, s.operation), parts);
+        } else if constexpr (!std::is_same_v<S, LabelBody>) {
+          KeyWriter keys{dim, fmt::format("type = \"{}\"", S::names.of(dim))};
+          S::list(s, keys);
+          return "{ " + keys.all + " }";
+        } else {
+          return {};  // comes from [[labels]]
+        }
+      },
+      shape);
+}
 
 class Writer {
  public:
@@ -237,7 +247,7 @@ void write_bodies(Writer& out, const Draft& draft) {
   for (std::size_t i = 0; i < draft.shaped_bodies; ++i) {
     const BodySpec& body = c.bodies[i];
     out.section("[[bodies]]");
-    out.raw("shape", std::visit(ShapeWriter{c.domain.dimension}, body.shape));
+    out.raw("shape", text_of(body.shape, c.domain.dimension));
     out.key("material", c.materials[body.material].name);
     out.motion(body.velocity, body.angular_velocity);
     out.key("initial_pressure", body.initial_pressure);
@@ -251,13 +261,26 @@ void write_bodies(Writer& out, const Draft& draft) {
     out.key("initial_pressure", grains.initial_pressure);
     if (!grains.group.empty()) out.key("group", grains.group);
   }
+  for (const auto& labels : draft.labels) {
+    out.section("[[labels]]");
+    out.key("file", labels.copy);
+    if (!labels.table.empty()) out.key("table", labels.table);
+    if (labels.common.material >= 0) out.key("material", c.materials[labels.common.material].name);
+    out.key("scale", labels.placement.scale);
+    out.vector("move", labels.placement.move);
+    const Vec3& turn = labels.placement.rotate;
+    out.raw("rotate", c.domain.dimension == 3 ? list_of(turn, 3) : text_of(turn.z()));
+    out.motion(labels.common.velocity, labels.common.angular_velocity);
+    out.key("initial_pressure", labels.common.initial_pressure);
+    if (!labels.common.group.empty()) out.key("group", labels.common.group);
+  }
   for (const auto& insert : c.inserts) {
     out.section("[[insert]]");
     out.text(insert.text);
   }
   for (const auto& remove : c.removes) {
     out.section("[[remove]]");
-    out.raw("region", std::visit(ShapeWriter{c.domain.dimension}, remove.region));
+    out.raw("region", text_of(remove.region, c.domain.dimension));
     out.key("start", remove.start);
     if (std::isfinite(remove.end)) out.key("end", remove.end);
     out.key("every", remove.every);

@@ -9,6 +9,7 @@
 #include "cairn/io/result_files.hpp"
 #include "cairn/io/run_record.hpp"
 #include "posix_file.hpp"
+#include "shape_copies.hpp"
 
 namespace cairn {
 namespace {
@@ -64,7 +65,10 @@ std::string foreign(const fs::path& file, const F& is_own) {
 
 std::string foreign_result(const fs::path& file) {
   const std::string name = file.filename().string();
-  return foreign(file, [&](std::string_view head) { return is_marked(name, head); });
+  return foreign(file, [&](std::string_view head) {
+    if (name.starts_with(reading::shape_copy)) return reading::is_shape_copy(name, PosixFile(file, O_RDONLY | O_NOFOLLOW));
+    return is_marked(name, head);
+  });
 }
 
 std::string foreign_pack(const fs::path& file) {

@@ -5,8 +5,10 @@
 
 import gzip
 import os
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 from harness import PATIENCE, ROOT, Program, fresh_folder
@@ -24,6 +26,24 @@ def rows(*columns) -> str:
 
 XYZR = ("{x}", "{y}", "{z}", "{r}")
 DUMP_HEAD = "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n3\nITEM: BOX BOUNDS pp pp ff\n0 1\n0 1\n0 1\n"
+
+
+def vtp(cut: int = 0) -> bytes:
+    """VTK points as DEM programs write them: appended bytes, compressed by zlib in blocks."""
+    def packed(values):
+        raw = struct.pack(f"<{len(values)}d", *values)
+        blocks = [zlib.compress(raw[:32]), zlib.compress(raw[32:])]
+        return struct.pack("<5I", 2, 32, len(raw) - 32, *map(len, blocks)) + b"".join(blocks)
+
+    points = packed([v for s in SPHERES for v in s[:3]])
+    text = ('<?xml version="1.0"?>\n<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt32" '
+            'compressor="vtkZLibDataCompressor"><PolyData><Piece NumberOfPoints="3"><PointData>'
+            '<DataArray type="Float64" Name="radii" format="ascii">' + " ".join(str(s[3]) for s in SPHERES)
+            + '</DataArray></PointData><Points><DataArray type="Float64" Name="Points" NumberOfComponents="3" '
+            'format="appended" offset="0"/></Points></Piece></PolyData>\n<AppendedData encoding="raw">\n_')
+    return text.encode() + points[:len(points) - cut] + b"\n</AppendedData></VTKFile>"
+
+
 FRAME = DUMP_HEAD + "ITEM: ATOMS id type x y z radius \n" + rows("{n}", "1", *XYZR).replace("\t", " ")
 LOW, HIGH = min(x - r for x, _, _, r in SPHERES), max(x + r for x, _, _, r in SPHERES)
 BOX = "{low} {high} xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n"
@@ -41,7 +61,17 @@ GOOD = {
     "yade_material.txt": ("#format x_y_z_r_matId\n" + rows(*XYZR, "7"), SPHERES),
     "yade_id.txt": ("#format id_x_y_z_r_matId\n" + rows("{n}", *XYZR, "1"), SPHERES),
     "yade_attrs.txt": ("#format x_y_z_r_attrs\n# x y z r mass\n" + rows(*XYZR, "7", "8", "9"), SPHERES),
-    "yade_clumps.txt": ("#format x_y_z_r_clumpId\n" + rows(*XYZR, "3"), SPHERES),
+    "yade_clumps.txt": ("#format x_y_z_r_clumpId\n" + rows(*XYZR, "3"), [(*s, 3.0) for s in SPHERES]),
+    "yade_other.txt": ("#format id_r_x_y_z_mask\n" + rows("{n}", "{r}", *XYZR[:3], "1"), SPHERES),
+    "tilted.txt": (FRAME.format(step=0).replace("pp pp ff\n0 1\n0 1\n", "xy xz yz pp pp ff\n0 1.25 0.25\n0 1 0\n")
+                   .replace("0 1\nITEM: ATOMS", "0 1 0\nITEM: ATOMS").replace("x y z radius", "xs ys zs radius"),
+                   [(x + 0.25 * y, y, z, r) for x, y, z, r in SPHERES]),
+    "extended.xyz": ("3\nLattice=\"1 0 0 0 1 0 0 0 1\" Properties=species:S:1:pos:R:3:radius:R:1\n"
+                     + rows("Si", *XYZR).replace("\t", " "), SPHERES),
+    "old.vtk": ("# vtk DataFile Version 3.0\nspheres\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n" + rows(*XYZR[:3])
+                + "POINT_DATA 3\nSCALARS radius float 1\nLOOKUP_TABLE default\n" + rows("{r}"), SPHERES),
+    "comma.csv": ("x;y;z;r\r\n" + rows(*XYZR).replace("\t", ";").replace(".", ","), SPHERES),
+    "points.vtp": (vtp(), SPHERES),
     "yade_liggghts.txt": (YADE_LIGGGHTS, SPHERES),
     "lammps.data": (LAMMPS_DATA, SPHERES),
     "mercury.data": (MERCURY_3D.format(time=0), SPHERES),
@@ -73,6 +103,9 @@ BAD = {
     "frame.txt": (FRAME.format(step=0), ["--frame", "3"], "no frame 3"),
     "item.txt": (FRAME.format(step=0).replace("ITEM: BOX", "ITEM: B\x1bX"), [], "is not known"),
     "empty.txt": ("", [], "is empty"),
+    "cut.vtp": (vtp(cut=9), [], "cut off or damaged"),
+    "colour.csv": ("a,b,c,size\n" + rows(*XYZR).replace("\t", ","), ["--columns", "x=q,y=b,z=c,r=size"], "no column 'q'"),
+    "no_radius.xyz": ("3\nProperties=species:S:1:pos:R:3\n" + rows("Si", *XYZR[:3]), [], "radius"),
 }
 
 
@@ -100,7 +133,8 @@ def good(scratch: Path) -> list[str]:
         elif name.startswith("cut") and "cut off" not in done.stderr and "left out" not in done.stderr:
             problems.append(f"{name}: what is left out is not said: {done.stderr}")
     for arguments, name in ((["--columns", "n x y z r"], "no_header.txt"), (["--format", "yade"], "four_columns.txt"),
-                            (["--size", "radius"], "doubtful.data")):
+                            (["--size", "radius"], "doubtful.data"),
+                            (["--columns", "x=a,y=b,z=c,r=size"], "colour.csv")):
         out = scratch / f"{name}.csv"
         done = run(write(scratch / name, BAD[name][0]), "-o", out, *arguments)
         if done.returncode != 0 or table(out) != SPHERES:
@@ -139,8 +173,12 @@ def read_back(cairn: Program, scratch: Path) -> list[str]:
     case = ('domain = { dimension = 3, upper = [0.4, 0.3, 0.3], cells = [40, 30, 30] }\ntime = { steps = 1 }\n'
             'materials.soft = { model = "neo_hookean", density = 1e3, shear_modulus = 1e5, bulk_modulus = 1e5 }\n'
             'grains = [{ file = "yade_id.txt.csv", material = "soft" }]\n')
-    done = cairn("check", write(scratch / "case.toml", case))
-    return [] if done.code == 0 and "bodies     3" in done.out else [f"check: {done.code} {done.err} {done.out}"]
+    problems = []
+    for name, bodies in (("yade_id.txt.csv", 3), ("yade_clumps.txt.csv", 1)):
+        done = cairn("check", write(scratch / "case.toml", case.replace("yade_id.txt.csv", name)))
+        if done.code != 0 or f"bodies     {bodies} " not in done.out:
+            problems.append(f"check: {done.code} {done.err} {done.out}")
+    return problems
 
 
 def main() -> int:

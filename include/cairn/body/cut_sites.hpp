@@ -14,7 +14,8 @@ struct PointSite {
   Vec3 position = Vec3::Zero();
 };
 
-/// True for balls, ellipsoids and compounds of them: shapes without flat faces.
+/// True for shapes without flat faces, or that do not know of them: balls, ellipsoids, what comes from files, and
+/// compounds of these.
 bool is_round(const Shape& shape);
 
 /// Whether the surface of a shape is cut where that is asked for, with `per_direction` points along the smallest side

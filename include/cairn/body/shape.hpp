@@ -1,56 +1,39 @@
 #pragma once
 /// Geometry of bodies: which points of space a body fills at the start. One set of shapes serves 2D and 3D:
-/// in 2D every z is zero and a `Ball` is a disk.
+/// in 2D every z is zero and a `Ball` is a disk. Each shape is a struct in a header of its own (CONTRIBUTING.md,
+/// "Add a shape").
 
-#include <string>
 #include <variant>
 #include <vector>
 
-#include "cairn/core/types.hpp"
+#include "cairn/body/shapes/ball.hpp"
+#include "cairn/body/shapes/box.hpp"
+#include "cairn/body/shapes/cylinder.hpp"
+#include "cairn/body/shapes/ellipsoid.hpp"
+#include "cairn/body/shapes/half_space.hpp"
+#include "cairn/body/shapes/label_body.hpp"
+#include "cairn/body/shapes/mesh.hpp"
+#include "cairn/body/shapes/outline.hpp"
+#include "cairn/body/shapes/polygon.hpp"
 
 namespace cairn {
 
-/// Axis-aligned bounds [m]; may be infinite.
-struct Bounds {
-  Vec3 lower, upper;
-};
-
-struct Ball {
-  Vec3 centre;
-  double radius;  // [m]
-};
-/// Axis-aligned box turned by `angle` [rad] about its centre (about z).
-struct BoxShape {
-  Vec3 lower, upper;
-  double angle = 0;
-};
-/// Ellipse or ellipsoid with half-axes `radii` [m], turned by `angle` [rad] about z.
-struct Ellipsoid {
-  Vec3 centre, radii;
-  double angle = 0;
-};
-/// Simple polygon in the x-y plane, either orientation (2D only).
-struct Polygon {
-  std::vector<Vec3> points;
-};
-/// Solid cylinder between the centres of its ends (3D only).
-struct Cylinder {
-  Vec3 from, to;
-  double radius;
-};
-/// The side of the plane that `normal` points away from.
-struct HalfSpace {
-  Vec3 point, normal;
-};
 struct Compound;
 
-using Shape = std::variant<Ball, BoxShape, Ellipsoid, Polygon, Cylinder, HalfSpace, Compound>;
+/// New ones at the end: checkpoints know a shape by its place here.
+using Shape =
+    std::variant<Ball, BoxShape, Ellipsoid, Polygon, Cylinder, HalfSpace, Compound, Mesh, Outline, LabelBody>;
 
 enum class CompoundOperation { union_of, difference, intersection };
 /// Union, difference (the first without the others) or intersection of shapes.
 struct Compound {
   CompoundOperation operation;
   std::vector<Shape> of;
+
+  bool holds(const Vec3& x) const;
+  Bounds extent() const;
+  /// An estimate: what a difference takes away from its first shape does not count.
+  double width() const;
 };
 
 /// True where `x` lies inside the shape (its boundary counts as inside).
@@ -59,10 +42,14 @@ bool contains(const Shape& shape, const Vec3& x);
 /// Bounds that hold the shape; infinite for a half-space not cut by anything.
 Bounds bounds(const Shape& shape);
 
-/// Centre about which a body spins: the centre of a ball or ellipsoid, else of the finite bounds.
+/// Centre about which a body spins: the centre of a ball or ellipsoid, the centroid of a mesh or outline, the middle of
+/// the largest ball in a label, else the middle of the finite bounds.
 Vec3 centre(const Shape& shape);
 
 /// Smallest width of the shape [m], an estimate for resolution warnings (twice the smallest radius for a ball).
 double smallest_width(const Shape& shape);
+
+/// Volume of a whole shape where it knows it itself [m^Dim]; below 0: it has to be measured.
+double known_volume(const Shape& shape);
 
 }  // namespace cairn

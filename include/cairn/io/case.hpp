@@ -135,11 +135,13 @@ struct Output {
   std::vector<int> track;  // bodies of bodies.csv
 };
 
-/// A grain table that the case reads, and the name of its copy beside the case.toml of the results.
+/// A grain table, or the file of a shape, that the case reads, and the name of its copy beside the case.toml of the
+/// results.
 struct CaseTable {
   std::filesystem::path file;
   std::string copy;
   std::uint64_t checksum = 0;  // of its bytes, as they were read (checksum.hpp)
+  bool marked = true;          // the copy begins with a line that says whose it is; else it has the same bytes
 };
 
 struct RunStage;
@@ -152,7 +154,7 @@ struct Case {
   SolverOptions solver;
   ContactOptions contact;
   std::vector<Material> materials;
-  std::vector<BodySpec> bodies;  // [[bodies]] in order, then the rows of every [[grains]] in order
+  std::vector<BodySpec> bodies;  // [[bodies]], then the rows of every [[grains]], then the labels of every [[labels]]
   std::vector<Drive> drives;
   std::vector<CrackSpec> cracks;
   CrackOptions crack;

@@ -1,0 +1,35 @@
+#pragma once
+/// Closed surface of triangles from a file (3D only).
+
+#include "cairn/body/shapes/placement.hpp"
+#include "cairn/body/solid.hpp"
+
+namespace cairn {
+
+struct Mesh {
+  static constexpr shapes::Names names = {"", "mesh"};
+  static constexpr bool round = true;
+
+  ShapeFile file;
+  Placement placement;
+  std::string solid;  // its name, or its number from 0; empty: all that the file holds
+  double holes = 0;   // the largest that is closed [m]
+  std::shared_ptr<const Solid> inside{};  // in the file's lengths
+  Place place{};
+  Bounds box{};
+
+  template <class Self, class Keys>
+  static void list(Self& s, Keys&& keys) {
+    keys.file("file", s.file);
+    keys.placement(s.placement);
+    keys.text("solid", s.solid);
+    keys.not_negative("holes", s.holes);
+  }
+  bool holds(const Vec3& x) const { return inside->holds(place.in_file(x)); }
+  Bounds extent() const { return box; }
+  double width() const { return place.factor() * inside->thickness(); }
+  Vec3 middle() const { return place.in_space(inside->centroid()); }
+  double volume() const { return std::pow(place.factor(), 3) * inside->volume(); }
+};
+
+}  // namespace cairn

@@ -1,0 +1,31 @@
+#pragma once
+/// Area within closed lines from a file (2D only): where an odd number of them goes round a place.
+
+#include "cairn/body/loops.hpp"
+#include "cairn/body/shapes/placement.hpp"
+
+namespace cairn {
+
+struct Outline {
+  static constexpr shapes::Names names = {"outline", ""};
+  static constexpr bool round = true;
+
+  ShapeFile file;
+  Placement placement;
+  std::shared_ptr<const Loops> loops{};  // in the file's lengths
+  Place place{};
+  Bounds box{};
+
+  template <class Self, class Keys>
+  static void list(Self& s, Keys&& keys) {
+    keys.file("file", s.file);
+    keys.placement(s.placement);
+  }
+  bool holds(const Vec3& x) const { return loops->holds(place.in_file(x)); }
+  Bounds extent() const { return box; }
+  double width() const { return place.factor() * loops->thickness(); }
+  Vec3 middle() const { return place.in_space(loops->centroid()); }
+  double volume() const { return std::pow(place.factor(), 2) * loops->area(); }
+};
+
+}  // namespace cairn
