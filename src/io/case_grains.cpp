@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
 
 #include "cairn/core/error.hpp"
 #include "cairn/core/memory.hpp"
@@ -155,20 +154,13 @@ class GrainTable {
   std::vector<std::string_view> cells_;
 };
 
-/// Ranks of this program on this machine, each of which reads the table; 1 where that is not known.
-int ranks_here() {
-  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"})
-    if (const char* text = std::getenv(name)) return std::max(1, std::atoi(text));
-  return 1;
-}
-
 /// Makes room for the rows of a table. \throws InputError "FILE: ..." where there is not that much memory
 void make_room(const std::filesystem::path& file, std::string_view text, std::vector<BodySpec>& bodies) {
   constexpr double more =
       250;  // of a body: where it was read, its place in the search for overlaps, what the solver knows
   const auto rows = std::ranges::count(text, '\n') + 1;
   const double needed = static_cast<double>(rows) * (sizeof(BodySpec) + more);
-  const double there = std::min(available_memory() / ranks_here(), memory_limit());
+  const double there = std::min(available_memory() / ranks_on_machine(), memory_limit());
   if (needed > there)
     throw InputError(
         fmt::format("{}: holds {} lines, which need at least {:.3g} GB of memory on every rank; there are "

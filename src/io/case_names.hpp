@@ -44,8 +44,8 @@ inline constexpr Named<NoiseFilter> noise_filter_names[] = {{"off", NoiseFilter:
                                                             {"strong", NoiseFilter::strong},
                                                             {"xpic", NoiseFilter::xpic}};
 inline constexpr Named<Plane> plane_names[] = {{"strain", Plane::strain}, {"stress", Plane::stress}};
-inline constexpr Named<Partition> partition_names[] = {{"metis", Partition::metis},
-                                                       {"round_robin", Partition::round_robin}};
+inline constexpr Named<Partition> partition_names[] = {
+    {"metis", Partition::metis}, {"curve", Partition::curve}, {"round_robin", Partition::round_robin}};
 inline constexpr Named<int> face_index_names[] = {{"left", 0}, {"right", 1}, {"bottom", 2},
                                                   {"top", 3},  {"back", 4},  {"front", 5}};
 inline constexpr Named<CompoundOperation> compound_names[] = {{"union", CompoundOperation::union_of},

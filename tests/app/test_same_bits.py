@@ -150,7 +150,7 @@ def check_content(name: str, folder: Path, settings: dict) -> list[str]:
 
 
 def whole_cases(program: Program, scratch: Path, pool) -> list[str]:
-    """Both cases on every number of ranks with both partitions, and their resolved text again."""
+    """Both cases on every number of ranks with both partitions, along the curve, and their resolved text again."""
     problems, waiting = [], []
     for name, settings in CASES.items():
         case, reference = ROOT / "cases" / f"{name}.toml", scratch / f"{name}_1"
@@ -160,7 +160,7 @@ def whole_cases(program: Program, scratch: Path, pool) -> list[str]:
             continue
         resolved = reference / "case.toml"
         waiting.append(pool.submit(run_and_compare, program, resolved, {}, reference, scratch / f"{name}_again", 2))
-        for ranks, partition in itertools.product(RANKS, PARTITIONS):
+        for ranks, partition in [*itertools.product(RANKS, PARTITIONS), (3, "curve")]:
             changed = settings | {"parallel.partition": f'"{partition}"'}
             out = scratch / f"{name}_{ranks}_{partition}"
             waiting.append(pool.submit(run_and_compare, program, case, changed, reference, out, ranks))

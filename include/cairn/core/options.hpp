@@ -30,7 +30,7 @@ enum class Leaving { remove, stop };
 enum class LostPoints { stop, drop };
 
 /// How patches are dealt to ranks; never changes a result.
-enum class Partition { metis, round_robin };
+enum class Partition { metis, curve, round_robin };
 
 struct ParallelOptions {
   Partition partition = Partition::metis;

@@ -316,7 +316,7 @@ class Simulation {
   std::vector<std::string> warnings_;
   std::int64_t patches_computed_ = 0;
   std::size_t blank_before_ = 0;  // patches without points or history when they were last forgotten
-  int times_balanced_ = 0;
+  int times_balanced_ = 0, looks_to_skip_ = 0, looks_skipped_ = 0;
   double seconds_balancing_ = 0;
   SpeedLimits speeds_;  // of this rank, in the step under way
   static constexpr int speed_size = 6;
