@@ -5,8 +5,11 @@
 
 namespace cairn::reading {
 
-inline constexpr Named<ShapeFunction> shape_function_names[] = {
-    {"linear", ShapeFunction::linear}, {"gimp", ShapeFunction::gimp}, {"bspline2", ShapeFunction::bspline2}};
+inline constexpr Named<ShapeFunction> shape_function_names[] = {{"linear", ShapeFunction::linear},
+                                                                {"gimp", ShapeFunction::gimp},
+                                                                {"bspline2", ShapeFunction::bspline2},
+                                                                {"cpdi", ShapeFunction::cpdi}};
+inline constexpr Named<Motion> motion_names[] = {{"centred", Motion::centred}, {"projected", Motion::projected}};
 inline constexpr Named<StressUpdate> stress_update_names[] = {{"last", StressUpdate::last},
                                                               {"first", StressUpdate::first},
                                                               {"both", StressUpdate::both},

@@ -150,6 +150,7 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   out.key("shape", name_of(shape_function_names, solver.shape));
   out.key("stress_update", name_of(stress_update_names, solver.stress_update));
   out.key("flip", solver.flip);
+  out.key("motion", name_of(motion_names, solver.motion));
   out.key("spin", solver.spin);
   out.key("points_per_cell", solver.points_per_cell);
   out.key("surface", name_of(surface_names, solver.surface));

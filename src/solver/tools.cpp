@@ -137,6 +137,7 @@ void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
       points.column(C::velocity + d)[p] = velocity[d];
     }
     for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = tool.spin_next[Dim == 2 ? 2 : s];
+    if (transfer_.shape == ShapeFunction::cpdi && speed > 0) turn_domain(points, p, turn);
     speeds_.point = std::max(speeds_.point, velocity.norm());
   }
 }

@@ -80,6 +80,7 @@ struct Piece {
   Points<Dim> points;
   NodeBox<Dim> nodes;
   bool projected = false;  // the nodes have the sums of the points as they are
+  AlignedDoubles domains;  // with CPDI: of the points as they were projected (grid/cpdi.hpp)
 
   Piece(int body_, int states) : body(body_), points(states) {}
 };
