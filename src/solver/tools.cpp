@@ -28,6 +28,19 @@ std::vector<ToolSum> sum_in_order(const std::vector<double>& records, std::size_
   return sums;
 }
 
+/// F of a rigid body's points, from which CPDI takes their domains.
+template <int Dim>
+void turn_deformation(Points<Dim>& points, const Mat3& turn) {
+  using C = PointColumns<Dim>;
+  for (int p = 0; p < points.size(); ++p)
+    for (int j = 0; j < Dim; ++j) {
+      Vec3 column = Vec3::Zero();
+      for (int i = 0; i < Dim; ++i) column[i] = points.column(C::deformation + tensor_index<Dim>(i, j))[p];
+      column = turn * column;
+      for (int i = 0; i < Dim; ++i) points.column(C::deformation + tensor_index<Dim>(i, j))[p] = column[i];
+    }
+}
+
 }  // namespace
 
 std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
@@ -137,9 +150,9 @@ void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
       points.column(C::velocity + d)[p] = velocity[d];
     }
     for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = tool.spin_next[Dim == 2 ? 2 : s];
-    if (transfer_.shape == ShapeFunction::cpdi && speed > 0) turn_domain(points, p, turn);
     speeds_.point = std::max(speeds_.point, velocity.norm());
   }
+  if (transfer_.shape == ShapeFunction::cpdi && material_of(piece).rigid && speed > 0) turn_deformation(points, turn);
 }
 
 /// Sums of this rank's patches; of the pistons alone, or of all tools.
