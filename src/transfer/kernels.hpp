@@ -140,8 +140,8 @@ Row momentum_row(const double (&p)[Dim]) {
 template <int gradient, class Row, int stride = row_width<Row>, int Dim, class Shape>
 void scatter(const Stencil<Dim, Shape>& stencil, int lane, const Row& value, const Row (&turn)[Dim], double* rows) {
   using S = Stencil<Dim, Shape>;
-  if constexpr (!is_product<S>)
-    return stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
+  if constexpr (!is_product<S>) {
+    stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
       Row factor = equal_row<Row>(at.value), sum = value;
       if constexpr (gradient != no_gradient) {
         factor[gradient - 1] = at.volume;
@@ -151,25 +151,27 @@ void scatter(const Stencil<Dim, Shape>& stencil, int lane, const Row& value, con
         for (int d = 0; d < Dim; ++d) sum += turn[d] * at.arm[d];
       add_row<stride>(rows, node, sum * factor);
     });
-  const auto x = stencil.along_x(lane);
-  Row factor[S::n];
-  for (int i = 0; i < S::n; ++i) {
-    factor[i] = equal_row<Row>(x.value[i]);
-    if constexpr (gradient != no_gradient) factor[i][gradient] = x.slope[i];
-  }
-  stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-    Row common = equal_row<Row>(row.value), sum = value;
-    if constexpr (gradient != no_gradient)
-      for (int d = 1; d < Dim; ++d) common[gradient + d] = row.slope[d];
-    if constexpr (S::spinning)
-      for (int d = 1; d < Dim; ++d) sum += turn[d] * row.arm[d];
-    sum *= common;
+  } else {
+    const auto x = stencil.along_x(lane);
+    Row factor[S::n];
     for (int i = 0; i < S::n; ++i) {
-      Row given = sum * factor[i];
-      if constexpr (S::spinning) given += turn[0] * (row.value * x.lever[i]);
-      add_row<stride>(rows, node + i, given);
+      factor[i] = equal_row<Row>(x.value[i]);
+      if constexpr (gradient != no_gradient) factor[i][gradient] = x.slope[i];
     }
-  });
+    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      Row common = equal_row<Row>(row.value), sum = value;
+      if constexpr (gradient != no_gradient)
+        for (int d = 1; d < Dim; ++d) common[gradient + d] = row.slope[d];
+      if constexpr (S::spinning)
+        for (int d = 1; d < Dim; ++d) sum += turn[d] * row.arm[d];
+      sum *= common;
+      for (int i = 0; i < S::n; ++i) {
+        Row given = sum * factor[i];
+        if constexpr (S::spinning) given += turn[0] * (row.value * x.lever[i]);
+        add_row<stride>(rows, node + i, given);
+      }
+    });
+  }
 }
 
 /// As scatter, with the momentum m (v + w x arm) of point p besides `value`.
@@ -294,20 +296,22 @@ struct PointForce {
     Lanes4 columns[Dim];
     for (int j = 0; j < Dim; ++j) columns[j] = column(j);
     const Lanes4 weight = gravity * mass[lane];
-    if constexpr (!is_product<Stencil<Dim, Shape>>)
-      return stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
+    if constexpr (!is_product<Stencil<Dim, Shape>>) {
+      stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
         Lanes4 given = weight * at.value;
         for (int j = 0; j < Dim; ++j) given += columns[j] * at.slope[j];
         add_row<vector_width>(force, node, given);
       });
-    const auto x = stencil.along_x(lane);
-    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-      const Lanes4 by_slope = columns[0] * row.value;
-      Lanes4 by_value = weight * row.value;
-      for (int j = 1; j < Dim; ++j) by_value += columns[j] * row.slope[j];
-      for (int i = 0; i < Stencil<Dim, Shape>::n; ++i)
-        add_row<vector_width>(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
-    });
+    } else {
+      const auto x = stencil.along_x(lane);
+      stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+        const Lanes4 by_slope = columns[0] * row.value;
+        Lanes4 by_value = weight * row.value;
+        for (int j = 1; j < Dim; ++j) by_value += columns[j] * row.slope[j];
+        for (int i = 0; i < Stencil<Dim, Shape>::n; ++i)
+          add_row<vector_width>(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
+      });
+    }
   }
 };
 

@@ -27,22 +27,22 @@ PointMotion<Dim> gather_motion(const Stencil<Dim, Shape>& stencil, int lane, con
       if constexpr (S::spinning)
         for (int d = 0; d < Dim; ++d) m.moment[d] += given * at.arm[d];
     });
-    return m;
+  } else {
+    const auto x = stencil.along_x(lane);
+    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      MotionRow<Dim> by_value{}, by_lever{};
+      for (int i = 0; i < S::n; ++i) {
+        const auto at = load_row<MotionRow<Dim>>(motion, node + i);
+        by_value += at * x.value[i];
+        if constexpr (S::spinning) by_lever += at * x.lever[i];
+      }
+      m.sum += by_value * row.value;
+      if constexpr (S::spinning) {
+        m.moment[0] += by_lever * row.value;
+        for (int d = 1; d < Dim; ++d) m.moment[d] += by_value * (row.value * row.arm[d]);
+      }
+    });
   }
-  const auto x = stencil.along_x(lane);
-  stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-    MotionRow<Dim> by_value{}, by_lever{};
-    for (int i = 0; i < S::n; ++i) {
-      const auto at = load_row<MotionRow<Dim>>(motion, node + i);
-      by_value += at * x.value[i];
-      if constexpr (S::spinning) by_lever += at * x.lever[i];
-    }
-    m.sum += by_value * row.value;
-    if constexpr (S::spinning) {
-      m.moment[0] += by_lever * row.value;
-      for (int d = 1; d < Dim; ++d) m.moment[d] += by_value * (row.value * row.arm[d]);
-    }
-  });
   return m;
 }
 
