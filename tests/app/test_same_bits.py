@@ -59,6 +59,7 @@ VARIATIONS = {
     "pass_after": {"contact.passes": '"after"'},
     "no_fill": {"contact.fill": 0.0},
     "fill": {"contact.fill": 0.8},
+    "cpdi": {"solver.shape": '"cpdi"', "solver.motion": '"projected"'},
     "no_filter": {"solver.noise_filter": '"off"'},
     "xpic": {"solver.noise_filter": '"xpic"', "solver.noise_order": 2},
     "impulse_limit": {"contact.impulse_limit": 0.1},
