@@ -47,6 +47,12 @@ if(NOT MUPARSER_INCLUDE_DIR OR NOT MUPARSER_LIBRARY)
   cairn_missing("muparser 2 (Debian: libmuparser-dev)")
 endif()
 
+find_path(XXHASH_INCLUDE_DIR xxhash.h)
+find_library(XXHASH_LIBRARY xxhash)
+if(NOT XXHASH_INCLUDE_DIR OR NOT XXHASH_LIBRARY)
+  cairn_missing("xxHash 0.8 (Debian: libxxhash-dev)")
+endif()
+
 # The name of the MPI library that a shared library asks for, or that it has itself; empty for a static library.
 function(cairn_mpi_of library tag result)
   set(${result} "" PARENT_SCOPE)

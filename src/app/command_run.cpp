@@ -12,6 +12,7 @@
 #include "cairn/io/run_record.hpp"
 #include "cairn/solver/run.hpp"
 #include "commands.hpp"
+#include "estimate.hpp"
 #include "report.hpp"
 
 namespace cairn::app {
@@ -111,6 +112,9 @@ int command_run(const RunArguments& arguments) {
     const ProgramFacts& facts = program_facts();
     say(stdout, "cairn {} ({}), {}\n", facts.version, facts.commit, facts.instruction_set);
     std::fflush(stdout);
+    int ranks = 1;
+    MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+    warn_of_memory(estimate(c, ranks).bytes, ranks);
   };
   int code = on_first_rank(prepare);
   if (code == done)

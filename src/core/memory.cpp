@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <string>
@@ -72,6 +73,12 @@ double memory_limit() {
       least = std::min(least, static_cast<double>(limit.rlim_cur));
   }
   return least;
+}
+
+int ranks_on_machine() {
+  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"})
+    if (const char* text = std::getenv(name)) return std::max(1, std::atoi(text));
+  return 1;
 }
 
 }  // namespace cairn

@@ -1,4 +1,5 @@
-// Grain tables: CSV with a header line, columns x, y[, z], r[, vx, vy[, vz]][, material][, group][, clump] in any order;
+// Grain tables: CSV with a header line, columns x, y[, z], r[, vx, vy[, vz]][, material][, group][, clump] in any
+// order;
 // '#' starts a comment line. Rows of one clump are one body.
 
 #include <fmt/format.h>
@@ -6,7 +7,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 
 #include "cairn/core/error.hpp"
@@ -20,8 +20,8 @@ namespace {
 constexpr std::size_t most_errors = 20;  // reported for one table
 
 enum Column { x, y, z, r, vx, vy, vz, material, group, clump, column_count };
-constexpr std::string_view column_names[column_count] = {"x",  "y",        "z",     "r",    "vx", "vy",
-                                                         "vz", "material", "group", "clump"};
+constexpr std::string_view column_names[column_count] = {"x",  "y",  "z",        "r",     "vx",
+                                                         "vy", "vz", "material", "group", "clump"};
 
 std::string_view trimmed(std::string_view s) {
   const auto first = s.find_first_not_of(" \t\r");
@@ -165,7 +165,8 @@ class GrainTable {
     if (fresh) return false;
     BodySpec& first = draft_.result.bodies[entry->second];
     if (first.material != body.material || first.velocity != body.velocity)
-      problem("clump", fmt::format("has another material or velocity than the first row of its clump, {}", first.source));
+      problem("clump",
+              fmt::format("has another material or velocity than the first row of its clump, {}", first.source));
     if (!std::holds_alternative<Compound>(first.shape))
       first.shape = Compound{CompoundOperation::union_of, {first.shape}};
     std::get<Compound>(first.shape).of.push_back(body.shape);
@@ -193,20 +194,13 @@ class GrainTable {
   std::vector<std::string_view> cells_;
 };
 
-/// Ranks of this program on this machine, each of which reads the table; 1 where that is not known.
-int ranks_here() {
-  for (const char* name : {"OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE"})
-    if (const char* text = std::getenv(name)) return std::max(1, std::atoi(text));
-  return 1;
-}
-
 /// Makes room for the rows of a table. \throws InputError "FILE: ..." where there is not that much memory
 void make_room(const std::filesystem::path& file, std::string_view text, std::vector<BodySpec>& bodies) {
   constexpr double more =
       250;  // of a body: where it was read, its place in the search for overlaps, what the solver knows
   const auto rows = std::ranges::count(text, '\n') + 1;
   const double needed = static_cast<double>(rows) * (sizeof(BodySpec) + more);
-  const double there = std::min(available_memory() / ranks_here(), memory_limit());
+  const double there = std::min(available_memory() / ranks_on_machine(), memory_limit());
   if (needed > there)
     throw InputError(
         fmt::format("{}: holds {} lines, which need at least {:.3g} GB of memory on every rank; there are "

@@ -5,8 +5,11 @@
 
 namespace cairn::reading {
 
-inline constexpr Named<ShapeFunction> shape_function_names[] = {
-    {"linear", ShapeFunction::linear}, {"gimp", ShapeFunction::gimp}, {"bspline2", ShapeFunction::bspline2}};
+inline constexpr Named<ShapeFunction> shape_function_names[] = {{"linear", ShapeFunction::linear},
+                                                                {"gimp", ShapeFunction::gimp},
+                                                                {"bspline2", ShapeFunction::bspline2},
+                                                                {"cpdi", ShapeFunction::cpdi}};
+inline constexpr Named<Motion> motion_names[] = {{"centred", Motion::centred}, {"projected", Motion::projected}};
 inline constexpr Named<StressUpdate> stress_update_names[] = {{"last", StressUpdate::last},
                                                               {"first", StressUpdate::first},
                                                               {"both", StressUpdate::both},
@@ -53,8 +56,8 @@ inline constexpr Named<NoiseFilter> noise_filter_names[] = {{"off", NoiseFilter:
                                                             {"strong", NoiseFilter::strong},
                                                             {"xpic", NoiseFilter::xpic}};
 inline constexpr Named<Plane> plane_names[] = {{"strain", Plane::strain}, {"stress", Plane::stress}};
-inline constexpr Named<Partition> partition_names[] = {{"metis", Partition::metis},
-                                                       {"round_robin", Partition::round_robin}};
+inline constexpr Named<Partition> partition_names[] = {
+    {"metis", Partition::metis}, {"curve", Partition::curve}, {"round_robin", Partition::round_robin}};
 inline constexpr Named<int> face_index_names[] = {{"left", 0}, {"right", 1}, {"bottom", 2},
                                                   {"top", 3},  {"back", 4},  {"front", 5}};
 inline constexpr Named<CompoundOperation> compound_names[] = {{"union", CompoundOperation::union_of},

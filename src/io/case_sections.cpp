@@ -194,6 +194,10 @@ void read_solver(Table solver, int dimension, SolverOptions& result) {
     solver.error("points_per_cell", fmt::format("{} is not a {}; choose one of {}", result.points_per_cell,
                                                 dimension == 2 ? "square number" : "cube number",
                                                 dimension == 2 ? "1, 4, 9, 16, 25, 36, 49, 64" : "1, 8, 27, 64, 125"));
+  result.motion = solver.choice("motion", motion_names, result.motion);
+  if (result.motion == Motion::projected && result.stress_update != StressUpdate::both &&
+      result.stress_update != StressUpdate::modified_last)
+    solver.error("motion", "\"projected\" needs stress_update = \"both\" or \"modified_last\"");
   result.surface = solver.choice("surface", surface_names, result.surface);
   result.noise_filter = solver.choice("noise_filter", noise_filter_names, result.noise_filter);
   result.noise_order = static_cast<int>(solver.integer("noise_order", result.noise_order, 1, 20));

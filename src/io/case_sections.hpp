@@ -19,7 +19,7 @@ struct CommonSpec {
 /// One [[grains]] entry: a table of balls and what they share.
 struct GrainsSpec : CommonSpec {
   std::filesystem::path given, file;  // as the case has it, and absolute; empty where there is none
-  std::string copy;            // its name beside the results
+  std::string copy;                   // its name beside the results
 };
 
 /// One [[labels]] entry.
@@ -33,10 +33,10 @@ struct LabelsSpec {
 /// A case while it is read.
 struct Draft {
   Case result;
-  bool domain_known = false;       // the domain was read without an error
-  bool bodies_known = true;        // every grain table was read, so that the number of bodies is right
-  std::size_t shaped_bodies = 0;   // bodies from [[bodies]]; the rest come from the tables
-  std::vector<GrainsSpec> grains;  // in order
+  bool domain_known = false;                 // the domain was read without an error
+  bool bodies_known = true;                  // every grain table was read, so that the number of bodies is right
+  std::size_t shaped_bodies = 0;             // bodies from [[bodies]]; the rest come from the tables
+  std::vector<GrainsSpec> grains;            // in order
   std::vector<std::string> inserted_tables;  // for each [[insert]] the copy of its table; empty where it has none
   std::vector<LabelsSpec> labels;
   std::map<std::string, std::shared_ptr<const Solid>> solids;  // that were read, by what they are made of

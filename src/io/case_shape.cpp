@@ -19,9 +19,7 @@ struct KeyReader {
   void vectors(std::string_view key, std::vector<Vec3>& list) { list = table.vectors(key, dim); }
   void positive(std::string_view key, Vec3& v) { v = table.vector(key, dim, std::nullopt, reading::positive); }
   void positive(std::string_view key, double& value) { value = table.number(key, std::nullopt, reading::positive); }
-  void not_negative(std::string_view key, double& value) {
-    value = table.number(key, value, reading::not_negative);
-  }
+  void not_negative(std::string_view key, double& value) { value = table.number(key, value, reading::not_negative); }
   void angle(std::string_view key, double& value) { value = table.number(key, 0.0); }
   void text(std::string_view key, std::string& value) { value = table.text(key, value); }
   void file(std::string_view key, ShapeFile& f) { f.name = table.text(key, std::nullopt); }

@@ -131,13 +131,13 @@ class Writer {
   /// `along` is not given for walls. Nothing where there is no piston.
   std::string piston_of(const Piston& p, bool along) const {
     if (p.mass == 0) return {};
-    std::string text = fmt::format("{} = {{ {} = {}", p.gain > 0 ? "servo" : "piston", p.pressure ? "pressure" : "force",
-                                   table_of(p.force, 0, 1));
+    std::string text = fmt::format("{} = {{ {} = {}", p.gain > 0 ? "servo" : "piston",
+                                   p.pressure ? "pressure" : "force", table_of(p.force, 0, 1));
     if (p.force.repeat) text += ", repeat = true";
     if (p.area > 0) text += ", area = " + text_of(p.area);
     if (along) text += ", along = " + list_of(p.along, dim_);
     text += p.gain > 0 ? fmt::format(", gain = {}, largest = {}", text_of(p.gain), text_of(p.largest))
-                    : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
+                       : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
     return text + " }";
   }
   void drive(const Drive& d) {
@@ -188,6 +188,7 @@ void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& s
   out.key("shape", name_of(shape_function_names, solver.shape));
   out.key("stress_update", name_of(stress_update_names, solver.stress_update));
   out.key("flip", solver.flip);
+  out.key("motion", name_of(motion_names, solver.motion));
   out.key("spin", solver.spin);
   out.key("points_per_cell", solver.points_per_cell);
   out.key("surface", name_of(surface_names, solver.surface));
@@ -322,9 +323,9 @@ void write_crack_law(Writer& out, const CrackSpec& crack) {
   }
   if (crack.law == CrackLaw::cohesive || crack.growth.cohesive) {
     const CohesiveSpec& law = crack.cohesive;
-    std::string text = fmt::format("{{ shape = \"{}\", strength = {}, energy = {}",
-                                   name_of(cohesive_shape_names, law.shape), list_of(law.strength, 2),
-                                   list_of(law.energy, 2));
+    std::string text =
+        fmt::format("{{ shape = \"{}\", strength = {}, energy = {}", name_of(cohesive_shape_names, law.shape),
+                    list_of(law.strength, 2), list_of(law.energy, 2));
     if (law.shape == CohesiveShape::triangle) text += ", peak = " + text_of(law.peak);
     if (law.exponent > 0) text += ", exponent = " + text_of(law.exponent);
     out.raw("cohesive", text + fmt::format(", from = {}, to = {} }}", text_of(law.range[0]), text_of(law.range[1])));

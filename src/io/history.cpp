@@ -95,7 +95,7 @@ CsvWriter::CsvWriter(CsvWriter&& other) noexcept
       columns_(other.columns_),
       descriptor_(std::exchange(other.descriptor_, -1)),
       bytes_(other.bytes_),
-      sum_(other.sum_),
+      sum_(std::move(other.sum_)),
       error_(std::move(other.error_)) {}
 
 CsvWriter& CsvWriter::operator=(CsvWriter&& other) noexcept {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <map>
 
 #include "cairn/parallel/communicator.hpp"
 #include "cairn/parallel/crack_exchange.hpp"
@@ -87,21 +88,21 @@ double imbalance_of(const std::vector<std::int64_t>& work, const std::vector<int
 
 std::vector<int> keep_in_place(const std::vector<int>& parts, const std::vector<int>& owner,
                                const std::vector<std::int64_t>& work, int ranks) {
-  struct Overlap {
-    std::int64_t work;
-    int part, rank;
-  };
-  std::vector<Overlap> overlaps(static_cast<std::size_t>(ranks) * ranks);
-  for (int a = 0; a < ranks; ++a)
-    for (int b = 0; b < ranks; ++b) overlaps[static_cast<std::size_t>(a) * ranks + b] = {0, a, b};
-  for (std::size_t p = 0; p < parts.size(); ++p)
-    overlaps[static_cast<std::size_t>(parts[p]) * ranks + owner[p]].work += 1 + work[p];
-  std::stable_sort(overlaps.begin(), overlaps.end(),
-                   [](const Overlap& a, const Overlap& b) { return a.work > b.work; });
+  std::map<std::pair<int, int>, std::int64_t> overlaps;  // work of a part that a rank has already
+  for (std::size_t p = 0; p < parts.size(); ++p) overlaps[{parts[p], owner[p]}] += 1 + work[p];
+  std::vector<std::pair<std::int64_t, std::pair<int, int>>> largest;
+  for (const auto& [pair, sum] : overlaps) largest.emplace_back(-sum, pair);
+  std::ranges::sort(largest);
   std::vector<int> rank_of(ranks, -1);
   std::vector<bool> taken(ranks, false);
-  for (const auto& o : overlaps)
-    if (rank_of[o.part] < 0 && !taken[o.rank]) rank_of[o.part] = o.rank, taken[o.rank] = true;
+  for (const auto& [sum, pair] : largest)
+    if (const auto [part, rank] = pair; rank_of[part] < 0 && !taken[rank]) rank_of[part] = rank, taken[rank] = true;
+  int free = 0;
+  for (int& rank : rank_of) {
+    if (rank >= 0) continue;
+    while (taken[free]) ++free;
+    rank = free++;
+  }
   std::vector<int> renamed(parts.size());
   for (std::size_t p = 0; p < parts.size(); ++p) renamed[p] = rank_of[parts[p]];
   return renamed;

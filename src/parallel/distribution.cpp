@@ -3,6 +3,7 @@
 #include <metis.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "cairn/core/error.hpp"
 
@@ -55,17 +56,62 @@ std::uint64_t place_on_curve(const Lattice<Dim>& lattice, PatchId patch) {
   return code;
 }
 
-}  // namespace
+/// The patches in the order of the curve.
+template <int Dim>
+std::vector<std::size_t> along_curve(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches) {
+  std::vector<std::pair<std::uint64_t, std::size_t>> places;
+  for (std::size_t p = 0; p < patches.size(); ++p) places.emplace_back(place_on_curve(lattice, patches[p]), p);
+  std::ranges::sort(places);
+  std::vector<std::size_t> order;
+  for (const auto& [code, p] : places) order.push_back(p);
+  return order;
+}
+
+/// Where ranks 1 and on begin in a sequence of patches, of which each has one at least.
+/// \param sums    work of those before each place of the sequence, and at last of all
+/// \param before  the ranks now, in the order of the sequence, or nothing
+std::vector<std::size_t> cuts_of(const std::vector<double>& sums, const std::vector<int>& before, int ranks) {
+  const std::size_t count = sums.size() - 1;
+  const double share = sums.back() / ranks, slack = 0.05 * share;
+  const bool anchored = !before.empty() && std::ranges::is_sorted(before);
+  std::vector<std::size_t> cuts;
+  for (int rank = 1; rank < ranks; ++rank) {
+    const double wanted = rank * share;
+    auto cut = static_cast<std::size_t>(std::ranges::lower_bound(sums, wanted) - sums.begin());
+    if (cut > 0 && wanted - sums[cut - 1] < sums[cut] - wanted) --cut;
+    if (anchored) {
+      const auto old = static_cast<std::size_t>(std::ranges::lower_bound(before, rank) - before.begin());
+      if (std::abs(sums[old] - wanted) <= slack) cut = old;
+    }
+    cuts.push_back(std::clamp(cut, cuts.empty() ? 1 : cuts.back() + 1, count - static_cast<std::size_t>(ranks - rank)));
+  }
+  return cuts;
+}
+
+/// Ranks along the curve.
+template <int Dim>
+std::vector<int> cut_curve(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
+                           const std::vector<std::int64_t>& work, int ranks, const std::vector<int>& before) {
+  const auto order = along_curve(lattice, patches);
+  std::vector<double> sums{0};
+  std::vector<int> now;
+  for (const std::size_t p : order) {
+    sums.push_back(sums.back() + 1 + static_cast<double>(work[p]));  // as METIS's weights: one more for each patch
+    if (!before.empty()) now.push_back(before[p]);
+  }
+  const auto cuts = cuts_of(sums, now, ranks);
+  std::vector<int> owner(patches.size());
+  int rank = 0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    while (rank < ranks - 1 && i >= cuts[rank]) ++rank;
+    owner[order[i]] = rank;
+  }
+  return owner;
+}
 
 template <int Dim>
-std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
-                                    const std::vector<std::int64_t>& work, int ranks, Partition partition) {
-  std::vector<int> owner(patches.size(), 0);
-  if (ranks == 1) return owner;
-  if (partition == Partition::round_robin || std::ssize(patches) <= ranks) {
-    for (std::size_t p = 0; p < owner.size(); ++p) owner[p] = static_cast<int>(p % ranks);
-    return owner;
-  }
+std::vector<int> ask_metis(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
+                           const std::vector<std::int64_t>& work, int ranks) {
   Graph graph = build_graph(lattice, patches, work);
   idx_t vertices = static_cast<idx_t>(patches.size()), constraints = 1, parts = ranks, cut = 0;
   idx_t options[METIS_NOPTIONS];
@@ -78,8 +124,24 @@ std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vect
       method(&vertices, &constraints, graph.starts.data(), graph.neighbours.data(), graph.vertex_weights.data(),
              nullptr, graph.edge_weights.data(), &parts, nullptr, nullptr, options, &cut, part.data());
   if (status != METIS_OK) throw RunError("METIS could not partition the patches");
-  std::copy(part.begin(), part.end(), owner.begin());
-  return owner;
+  return {part.begin(), part.end()};
+}
+
+}  // namespace
+
+template <int Dim>
+std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
+                                    const std::vector<std::int64_t>& work, int ranks, Partition partition,
+                                    const std::vector<int>& before) {
+  std::vector<int> owner(patches.size(), 0);
+  if (ranks == 1) return owner;
+  if (partition == Partition::round_robin || std::ssize(patches) <= ranks) {
+    for (std::size_t p = 0; p < owner.size(); ++p) owner[p] = static_cast<int>(p % ranks);
+    return owner;
+  }
+  if (partition == Partition::metis && std::ssize(patches) <= most_for_metis)
+    return ask_metis(lattice, patches, work, ranks);
+  return cut_curve(lattice, patches, work, ranks, before);
 }
 
 template <int Dim>
@@ -162,8 +224,8 @@ std::vector<PatchId> PatchTable<Dim>::fill(const std::vector<PatchId>& patches) 
 template class PatchTable<2>;
 template class PatchTable<3>;
 template std::vector<int> distribute_patches(const Lattice<2>&, const std::vector<PatchId>&,
-                                             const std::vector<std::int64_t>&, int, Partition);
+                                             const std::vector<std::int64_t>&, int, Partition, const std::vector<int>&);
 template std::vector<int> distribute_patches(const Lattice<3>&, const std::vector<PatchId>&,
-                                             const std::vector<std::int64_t>&, int, Partition);
+                                             const std::vector<std::int64_t>&, int, Partition, const std::vector<int>&);
 
 }  // namespace cairn

@@ -69,19 +69,26 @@ void Simulation<Dim>::balance() {
   const auto time = timers_.measure(Stage::migrate);
   finish_speed_reduction();
   forget_blank_patches();
-  if (ranks_ == 1 || parallel_.partition != Partition::metis) return;
+  if (ranks_ == 1 || parallel_.partition == Partition::round_robin) return;
   std::vector<std::int64_t> work(table_.size(), 0);
-  for (auto& patch : patches_)
-    work[table_.find(patch.id)] = static_cast<std::int64_t>(patch.seconds * 1e9), patch.seconds = 0;
+  for (auto& patch : patches_) work[table_.find(patch.id)] = static_cast<std::int64_t>(patch.seconds * 1e9);
   MPI_Allreduce(MPI_IN_PLACE, work.data(), static_cast<int>(work.size()), MPI_INT64_T, MPI_SUM, comm_);
   const std::vector<int> before = table_.owners();
   const double now = imbalance_of(work, before, ranks_);
-  if (now < parallel_.imbalance) return;
+  // A rank that was held up once is no reason to move: half of the time before counts on.
+  for (auto& patch : patches_) patch.seconds *= 0.5;
+  if (now < parallel_.imbalance || looks_to_skip_-- > 0) return;
   const double start = MPI_Wtime();
-  const auto parts = distribute_patches(lattice_, table_.patches(), work, ranks_, Partition::metis);
+  const auto parts = distribute_patches(lattice_, table_.patches(), work, ranks_, parallel_.partition, before);
   const auto owner = keep_in_place(parts, before, work, ranks_);
-  if (imbalance_of(work, owner, ranks_) > 0.95 * now) return;
+  if (imbalance_of(work, owner, ranks_) > 0.95 * now) {  // in vain: the next tries come ever later
+    looks_skipped_ = std::min(2 * looks_skipped_ + 1, 31);
+    looks_to_skip_ = looks_skipped_;
+    return;
+  }
+  looks_skipped_ = looks_to_skip_ = 0;
   move_patches(patches_, table_, owner, lattice_, comm_);
+  for (auto& patch : patches_) patch.seconds = 0;
   connect_patches();
   ++times_balanced_;
   seconds_balancing_ += MPI_Wtime() - start;

@@ -153,6 +153,10 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
     }
   const bool walls = std::ranges::any_of(contact_.faces, [](const auto& f) { return f.type == FaceType::wall; });
   transfer_.normals_needed = walls || (bodies_.size() > 1 && transfer_.normals_needed);  // something to touch
+  if (solver_.shape == ShapeFunction::cpdi)
+    for (std::size_t b = 0; b < bodies_.size(); ++b)
+      transfer_.stretch.push_back(
+          std::cbrt(InitialState(materials_[bodies_[b].material].law, c.bodies[b].initial_pressure).volume_ratio));
   define_cracks(c);
   define_pouring(c);
   transfer_of_turning_ = transfer_;

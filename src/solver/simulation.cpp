@@ -233,7 +233,7 @@ void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
   sweeps_[p].repeat_pass(patch, lattice_, contact_, dt_);
   for (auto& piece : patch.pieces) velocity_from_momentum(piece);
   constrain_velocity(patch, lattice_, contact_.faces, bodies_, true);
-  for (auto& piece : patch.pieces) centre_motion(piece);
+  for (auto& piece : patch.pieces) solver_.motion == Motion::projected ? follow_projected(piece) : centre_motion(piece);
 }
 
 /// The last pass over the points: what is left to do with them, and they move. Those that left the patch are taken out;
@@ -292,7 +292,10 @@ void Simulation<Dim>::receive_points() {
   move_cracks();
   if ((steps_ + 1) % sort_interval == 0)
     for (auto& patch : patches_)
-      for (auto& piece : patch.pieces) sort_by_cell(piece, lattice_, patch.cells);
+      for (auto& piece : patch.pieces) {
+        sort_by_cell(piece, lattice_, patch.cells);
+        freeze_domains(piece, lattice_, transfer_);
+      }
 }
 
 template <int Dim>

@@ -29,6 +29,19 @@ std::vector<ToolSum> sum_in_order(const std::vector<double>& records, std::size_
   return sums;
 }
 
+/// F of a rigid body's points, from which CPDI takes their domains.
+template <int Dim>
+void turn_deformation(Points<Dim>& points, const Mat3& turn) {
+  using C = PointColumns<Dim>;
+  for (int p = 0; p < points.size(); ++p)
+    for (int j = 0; j < Dim; ++j) {
+      Vec3 column = Vec3::Zero();
+      for (int i = 0; i < Dim; ++i) column[i] = points.column(C::deformation + tensor_index<Dim>(i, j))[p];
+      column = turn * column;
+      for (int i = 0; i < Dim; ++i) points.column(C::deformation + tensor_index<Dim>(i, j))[p] = column[i];
+    }
+}
+
 }  // namespace
 
 std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
@@ -229,6 +242,7 @@ void Simulation<Dim>::move_rigid(Piece<Dim>& piece) {
     for (int s = 0; s < spin_size<Dim>; ++s) points.column(C::spin + s)[p] = tool.spin_next[Dim == 2 ? 2 : s];
     speeds_.point = std::max(speeds_.point, velocity.norm());
   }
+  if (transfer_.shape == ShapeFunction::cpdi && material_of(piece).rigid && speed > 0) turn_deformation(points, turn);
 }
 
 template <int Dim>

@@ -6,15 +6,15 @@
 #include <algorithm>
 #include <limits>
 
-#include "cairn/grid/shape_functions.hpp"
+#include "cairn/grid/cpdi.hpp"
 #include "cairn/transfer/transfer.hpp"
 #include "cut_blocks.hpp"
 
 namespace cairn::kernels {
 
-/// Calls f(shape) with the settings' shape function.
+/// Calls f(shape) with the settings' shape function; `domains` are those of so many points, for CPDI.
 template <int Dim, class F>
-void with_shape(const TransferSettings<Dim>& settings, F&& f) {
+void with_shape(const TransferSettings<Dim>& settings, const AlignedDoubles& domains, int points, F&& f) {
   switch (settings.shape) {
     case ShapeFunction::linear:
       return f(LinearShape{});
@@ -22,13 +22,20 @@ void with_shape(const TransferSettings<Dim>& settings, F&& f) {
       return f(GimpShape{settings.half_size});
     case ShapeFunction::bspline2:
       return f(QuadraticShape{});
+    case ShapeFunction::cpdi:
+      return f(CpdiShape{{}, domains.data(), domain_stride(points)});
   }
+}
+template <int Dim, class F>
+void with_shape(const TransferSettings<Dim>& settings, const Piece<Dim>& piece, F&& f) {
+  with_shape(settings, piece.domains, piece.points.size(), f);
 }
 
 /// As with_shape, for what moves points or their momentum: the shape is `Spinning` where points carry spin.
 template <int Dim, class F>
-void with_moving_shape(const TransferSettings<Dim>& settings, F&& f) {
-  with_shape(settings, [&]<class Shape>(const Shape& shape) { settings.spin ? f(Spinning<Shape>{shape}) : f(shape); });
+void with_moving_shape(const TransferSettings<Dim>& settings, const Piece<Dim>& piece, F&& f) {
+  with_shape(settings, piece,
+             [&]<class Shape>(const Shape& shape) { settings.spin ? f(Spinning<Shape>{shape}) : f(shape); });
 }
 
 /// Calls f(shape) with the weights of the normals, where they are not those of the shape function.
@@ -45,7 +52,7 @@ void for_chunks(const Points<Dim>& points, const Lattice<Dim>& lattice, const Bo
   for (int first = 0; first < points.size(); first += lane_count) {
     const double* x[Dim];
     for (int d = 0; d < Dim; ++d) x[d] = points.column(d) + first;
-    const Stencil<Dim, Shape> stencil(lattice, shape, box, x);
+    const Stencil<Dim, Shape> stencil(lattice, shape, box, x, first);
     f(first, std::min(lane_count, points.size() - first), stencil);
   }
 }
@@ -59,7 +66,7 @@ template <int Dim, class Shape, class F>
   for (int first = 0; first < points.size(); first += lane_count) {
     const double* x[Dim];
     for (int d = 0; d < Dim; ++d) x[d] = points.column(d) + first;
-    Stencil<Dim, Shape> stencil(lattice, shape, piece.nodes.box, x);
+    Stencil<Dim, Shape> stencil(lattice, shape, piece.nodes.box, x, first);
     const int count = std::min(lane_count, points.size() - first);
     const bool cut = blocks.reach(first);
     if (cut) blocks.enter(count, stencil.first, stencil.stride);
@@ -102,6 +109,12 @@ void add_row(double* rows, int node, Row row) {
 
 inline constexpr int no_gradient = -1;
 
+/// Whether the weights of a stencil are products.
+template <class S>
+inline constexpr bool is_product = requires(const S& stencil) {
+  stencil.along_x(0);
+};
+
 template <class Row>
 Row equal_row(double a) {
   if constexpr (row_width<Row> == 4)
@@ -122,29 +135,43 @@ Row momentum_row(const double (&p)[Dim]) {
 }
 
 /// Adds N times `value` to the rows of a point's nodes; in the columns from `gradient` on, grad N takes the place of N.
-/// `turn[d]` times the arm along d is added to `value` first (with spin). Rows begin `stride` numbers apart.
+/// `turn[d]` times the arm along d is added to `value` first (with spin). Rows begin `stride` numbers apart. A sum of
+/// volume is that before the gradient.
 template <int gradient, class Row, int stride = row_width<Row>, int Dim, class Shape>
 void scatter(const Stencil<Dim, Shape>& stencil, int lane, const Row& value, const Row (&turn)[Dim], double* rows) {
   using S = Stencil<Dim, Shape>;
-  const auto x = stencil.along_x(lane);
-  Row factor[S::n];
-  for (int i = 0; i < S::n; ++i) {
-    factor[i] = equal_row<Row>(x.value[i]);
-    if constexpr (gradient != no_gradient) factor[i][gradient] = x.slope[i];
-  }
-  stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-    Row common = equal_row<Row>(row.value), sum = value;
-    if constexpr (gradient != no_gradient)
-      for (int d = 1; d < Dim; ++d) common[gradient + d] = row.slope[d];
-    if constexpr (S::spinning)
-      for (int d = 1; d < Dim; ++d) sum += turn[d] * row.arm[d];
-    sum *= common;
+  if constexpr (!is_product<S>) {
+    stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
+      Row factor = equal_row<Row>(at.value), sum = value;
+      if constexpr (gradient != no_gradient) {
+        factor[gradient - 1] = at.volume;
+        for (int d = 0; d < Dim; ++d) factor[gradient + d] = at.slope[d];
+      }
+      if constexpr (S::spinning)
+        for (int d = 0; d < Dim; ++d) sum += turn[d] * at.arm[d];
+      add_row<stride>(rows, node, sum * factor);
+    });
+  } else {
+    const auto x = stencil.along_x(lane);
+    Row factor[S::n];
     for (int i = 0; i < S::n; ++i) {
-      Row given = sum * factor[i];
-      if constexpr (S::spinning) given += turn[0] * (row.value * x.lever[i]);
-      add_row<stride>(rows, node + i, given);
+      factor[i] = equal_row<Row>(x.value[i]);
+      if constexpr (gradient != no_gradient) factor[i][gradient] = x.slope[i];
     }
-  });
+    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      Row common = equal_row<Row>(row.value), sum = value;
+      if constexpr (gradient != no_gradient)
+        for (int d = 1; d < Dim; ++d) common[gradient + d] = row.slope[d];
+      if constexpr (S::spinning)
+        for (int d = 1; d < Dim; ++d) sum += turn[d] * row.arm[d];
+      sum *= common;
+      for (int i = 0; i < S::n; ++i) {
+        Row given = sum * factor[i];
+        if constexpr (S::spinning) given += turn[0] * (row.value * x.lever[i]);
+        add_row<stride>(rows, node + i, given);
+      }
+    });
+  }
 }
 
 /// As scatter, with the momentum m (v + w x arm) of point p besides `value`.
@@ -182,17 +209,24 @@ template <int Dim, class Shape>
 Tensor<Dim, Lanes> gather_strain(const Stencil<Dim, Shape>& stencil, int count, const double* velocity, double dt) {
   alignas(64) double rows[Dim][Dim][lane_count] = {};
   for (int lane = 0; lane < count; ++lane) {
-    const auto x = stencil.along_x(lane);
     Lanes4 sum[Dim] = {};
-    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-      Lanes4 by_value{}, by_slope{};
-      for (int i = 0; i < Stencil<Dim, Shape>::n; ++i) {
-        const Lanes4 v = load_row<Lanes4>(velocity, node + i);
-        by_value += v * x.value[i], by_slope += v * x.slope[i];
-      }
-      sum[0] += by_slope * row.value;
-      for (int j = 1; j < Dim; ++j) sum[j] += by_value * row.slope[j];
-    });
+    if constexpr (!is_product<Stencil<Dim, Shape>>) {
+      stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
+        const Lanes4 v = load_row<Lanes4>(velocity, node);
+        for (int j = 0; j < Dim; ++j) sum[j] += v * at.slope[j];
+      });
+    } else {
+      const auto x = stencil.along_x(lane);
+      stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+        Lanes4 by_value{}, by_slope{};
+        for (int i = 0; i < Stencil<Dim, Shape>::n; ++i) {
+          const Lanes4 v = load_row<Lanes4>(velocity, node + i);
+          by_value += v * x.value[i], by_slope += v * x.slope[i];
+        }
+        sum[0] += by_slope * row.value;
+        for (int j = 1; j < Dim; ++j) sum[j] += by_value * row.slope[j];
+      });
+    }
     for (int i = 0; i < Dim; ++i)
       for (int j = 0; j < Dim; ++j) rows[i][j][lane] = dt * sum[j][i];
   }
@@ -262,14 +296,22 @@ struct PointForce {
     Lanes4 columns[Dim];
     for (int j = 0; j < Dim; ++j) columns[j] = column(j);
     const Lanes4 weight = gravity * mass[lane];
-    const auto x = stencil.along_x(lane);
-    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-      const Lanes4 by_slope = columns[0] * row.value;
-      Lanes4 by_value = weight * row.value;
-      for (int j = 1; j < Dim; ++j) by_value += columns[j] * row.slope[j];
-      for (int i = 0; i < Stencil<Dim, Shape>::n; ++i)
-        add_row<vector_width>(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
-    });
+    if constexpr (!is_product<Stencil<Dim, Shape>>) {
+      stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
+        Lanes4 given = weight * at.value;
+        for (int j = 0; j < Dim; ++j) given += columns[j] * at.slope[j];
+        add_row<vector_width>(force, node, given);
+      });
+    } else {
+      const auto x = stencil.along_x(lane);
+      stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+        const Lanes4 by_slope = columns[0] * row.value;
+        Lanes4 by_value = weight * row.value;
+        for (int j = 1; j < Dim; ++j) by_value += columns[j] * row.slope[j];
+        for (int i = 0; i < Stencil<Dim, Shape>::n; ++i)
+          add_row<vector_width>(force, node + i, by_slope * x.slope[i] + by_value * x.value[i]);
+      });
+    }
   }
 };
 

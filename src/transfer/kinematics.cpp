@@ -10,7 +10,7 @@ std::vector<std::array<double, Dim + Dim * Dim>> point_kinematics(const Piece<Di
   using M = NodeMotion<Dim>;
   std::vector<std::array<double, Dim + Dim * Dim>> all(piece.points.size());
   const double* motion = piece.nodes.motion.data();
-  with_shape(settings, [&](const auto& shape) {
+  with_shape(settings, piece, [&](const auto& shape) {
     for_chunks(piece, lattice, shape, {read_rows(piece.nodes.motion, M::width)},
                [&](int first, int count, const auto& stencil) {
                  for (int lane = 0; lane < count; ++lane) {

@@ -56,7 +56,7 @@ void project_extras(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transf
   using E = NodeExtras<Dim>;
   const Box<Dim>& box = piece.nodes.box;
   piece.nodes.extras.assign(piece.nodes.storage() * E::width, 0.0);
-  with_shape(settings, [&](const auto& shape) {
+  with_shape(settings, piece, [&](const auto& shape) {
     for_chunks(piece.points, lattice, box, shape, [&](int first, int count, const auto& stencil) {
       const PointForce<Dim> stress(piece.points, first, 0, Vec<Dim>::Zero());
       alignas(64) double volume[lane_count];
@@ -106,7 +106,7 @@ Box<Dim> touched_nodes(const Points<Dim>& points, const Lattice<Dim>& lattice, c
       box.lower[d] = unset ? lower : std::min(box.lower[d], lower);
       box.upper[d] = unset ? upper : std::max(box.upper[d], upper);
     };
-    with_shape(settings, widen);
+    with_shape(settings, {}, 0, widen);
     if (settings.normals_needed) with_normal_shape(settings, widen);
     // The image of a body that reaches a symmetry plane may touch the nodes beyond, which other bodies use.
     if (settings.mirrored[d][0] && box.lower[d] == 0) box.lower[d] = -1;
@@ -148,10 +148,11 @@ void lay_out_nodes(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transfe
 template <int Dim>
 void project(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings, double density) {
   NodeBox<Dim>& nodes = piece.nodes;
+  freeze_domains(piece, lattice, settings);
   nodes.sums.assign(nodes.storage() * NodeSums<Dim>::width, 0.0);
   nodes.force.assign(nodes.storage() * vector_width, 0.0);
   const bool own_weights = settings.normals.weights == NormalSettings::Weights::of_shape;
-  with_moving_shape(settings, [&](const auto& shape) {
+  with_moving_shape(settings, piece, [&](const auto& shape) {
     const auto arrays = {add_rows(nodes.sums, NodeSums<Dim>::width), add_rows(nodes.force, vector_width)};
     for_chunks(piece, lattice, shape, arrays, [&](int first, int count, const auto& stencil) {
       scatter_sums(piece.points, first, count, stencil, density, settings.normals.by_mass, nodes.sums.data());

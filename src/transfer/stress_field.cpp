@@ -10,8 +10,9 @@ void project_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const Transf
   using N = NodeStress<Dim>;
   NodeBox<Dim>& nodes = piece.nodes;
   const Points<Dim>& points = piece.points;
+  freeze_domains(piece, lattice, settings);
   nodes.sums.assign(nodes.storage() * N::width, 0.0);
-  with_shape(settings, [&](const auto& shape) {
+  with_shape(settings, piece, [&](const auto& shape) {
     for_chunks(piece, lattice, shape, {add_rows(nodes.sums, N::width)}, [&](int first, int count, const auto& stencil) {
       alignas(64) double volume[lane_count];
       store(volume, load(points.column(C::volume) + first) * determinant(load_deformation(points, first)));
@@ -32,7 +33,7 @@ std::vector<std::array<double, symmetric_size<Dim>>> smooth_stress(const Piece<D
   using N = NodeStress<Dim>;
   std::vector<std::array<double, symmetric_size<Dim>>> smooth(piece.points.size());
   const double* rows = piece.nodes.sums.data();
-  with_shape(settings, [&](const auto& shape) {
+  with_shape(settings, piece, [&](const auto& shape) {
     for_chunks(piece, lattice, shape, {read_rows(piece.nodes.sums, N::width)},
                [&](int first, int count, const auto& stencil) {
                  for (int lane = 0; lane < count; ++lane) {

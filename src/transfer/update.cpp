@@ -19,21 +19,30 @@ struct PointMotion {
 template <int Dim, class Shape>
 PointMotion<Dim> gather_motion(const Stencil<Dim, Shape>& stencil, int lane, const double* motion) {
   using S = Stencil<Dim, Shape>;
-  const auto x = stencil.along_x(lane);
   PointMotion<Dim> m;
-  stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
-    MotionRow<Dim> by_value{}, by_lever{};
-    for (int i = 0; i < S::n; ++i) {
-      const auto at = load_row<MotionRow<Dim>>(motion, node + i);
-      by_value += at * x.value[i];
-      if constexpr (S::spinning) by_lever += at * x.lever[i];
-    }
-    m.sum += by_value * row.value;
-    if constexpr (S::spinning) {
-      m.moment[0] += by_lever * row.value;
-      for (int d = 1; d < Dim; ++d) m.moment[d] += by_value * (row.value * row.arm[d]);
-    }
-  });
+  if constexpr (!is_product<S>) {
+    stencil.for_weights(lane, [&](int node, const NodeWeights<Dim>& at) {
+      const auto given = load_row<MotionRow<Dim>>(motion, node) * at.value;
+      m.sum += given;
+      if constexpr (S::spinning)
+        for (int d = 0; d < Dim; ++d) m.moment[d] += given * at.arm[d];
+    });
+  } else {
+    const auto x = stencil.along_x(lane);
+    stencil.for_rows(lane, [&](int node, const RowWeights<Dim>& row) {
+      MotionRow<Dim> by_value{}, by_lever{};
+      for (int i = 0; i < S::n; ++i) {
+        const auto at = load_row<MotionRow<Dim>>(motion, node + i);
+        by_value += at * x.value[i];
+        if constexpr (S::spinning) by_lever += at * x.lever[i];
+      }
+      m.sum += by_value * row.value;
+      if constexpr (S::spinning) {
+        m.moment[0] += by_lever * row.value;
+        for (int d = 1; d < Dim; ++d) m.moment[d] += by_value * (row.value * row.arm[d]);
+      }
+    });
+  }
   return m;
 }
 
@@ -154,14 +163,14 @@ double move(Points<Dim>& points, int p, const PointMotion<Dim>& m, const Walls<D
 template <int Dim, class F>
 void for_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                std::initializer_list<RowArray> arrays, F&& f) {
-  with_shape(settings, [&](const auto& shape) { for_chunks(piece, lattice, shape, arrays, f); });
+  with_shape(settings, piece, [&](const auto& shape) { for_chunks(piece, lattice, shape, arrays, f); });
 }
 
 /// As for_piece, with spin where points carry it.
 template <int Dim, class F>
 void for_moving_piece(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                       std::initializer_list<RowArray> arrays, F&& f) {
-  with_moving_shape(settings, [&](const auto& shape) { for_chunks(piece, lattice, shape, arrays, f); });
+  with_moving_shape(settings, piece, [&](const auto& shape) { for_chunks(piece, lattice, shape, arrays, f); });
 }
 
 /// The arrays of nodes that passes read or add to.
@@ -372,19 +381,30 @@ void centre_motion(Piece<Dim>& piece) {
 }
 
 template <int Dim>
+void follow_projected(Piece<Dim>& piece) {
+  using M = NodeMotion<Dim>;
+  NodeBox<Dim>& nodes = piece.nodes;
+  for (std::size_t node = 0; node < nodes.rows(); ++node)
+    std::copy_n(nodes.velocity.data() + node * vector_width, Dim, nodes.motion.data() + node * M::width + M::velocity);
+}
+
+template <int Dim>
 std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>& piece, const Lattice<Dim>& lattice,
                                                              const TransferSettings<Dim>& settings) {
   std::vector<std::array<double, spin_size<Dim>>> inertia(piece.points.size());
   Box<Dim> everywhere;  // the points may have moved since the piece's own box was laid out
   for (int d = 0; d < Dim; ++d) everywhere.lower[d] = -2, everywhere.upper[d] = lattice.cells()[d] + 3;
-  with_moving_shape(settings, [&](const auto& shape) {
-    for_chunks(piece.points, lattice, everywhere, shape,
-               [&]<class Shape>(int first, int count, const Stencil<Dim, Shape>& stencil) {
-                 if constexpr (Stencil<Dim, Shape>::spinning)
-                   for (int lane = 0; lane < count; ++lane)
-                     for_spins<Dim>([&](int s, int i, int j) {
-                       inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
-                     });
+  if (!settings.spin) return inertia;
+  AlignedDoubles domains;  // those that the piece has may be of other points
+  if (settings.shape == ShapeFunction::cpdi)
+    domains = domains_of(piece.points, settings.stretch_of(piece.body), lattice, settings);
+  with_shape(settings, domains, piece.points.size(), [&]<class Shape>(const Shape& shape) {
+    for_chunks(piece.points, lattice, everywhere, Spinning<Shape>{shape},
+               [&](int first, int count, const Stencil<Dim, Spinning<Shape>>& stencil) {
+                 for (int lane = 0; lane < count; ++lane)
+                   for_spins<Dim>([&](int s, int i, int j) {
+                     inertia[first + lane][s] = stencil.spread[i][lane] + stencil.spread[j][lane];
+                   });
                });
   });
   return inertia;
@@ -418,6 +438,7 @@ void velocity_from_motion(Piece<Dim>& piece) {
   template void velocity_from_motion(Piece<Dim>&);                                                                    \
   template void subtract_seen(Piece<Dim>&, const Lattice<Dim>&, const TransferSettings<Dim>&);                        \
   template void centre_motion(Piece<Dim>&);                                                                           \
+  template void follow_projected(Piece<Dim>&);                                                                        \
   template std::vector<std::array<double, spin_size<Dim>>> spin_inertia(const Piece<Dim>&, const Lattice<Dim>&,       \
                                                                         const TransferSettings<Dim>&);
 CAIRN_INSTANTIATE(2)

@@ -213,7 +213,7 @@ CASES = [
           '[[contact.pair]]\nmaterials = ["soft", "wall"]\n', '["soft", "wall"]', "contact.pair.0.materials",
           '"wall" is a material here'),
     added("unknown_partition", '[parallel]\npartition = "metsi"\n', "metsi", "parallel.partition",
-          "metis, round_robin"),
+          "metis, curve, round_robin"),
     added("grain_table_missing", GRAINS, "pack.csv", "grains.0.file", "there is no file"),
     Bad("no_bodies", ["case.toml:1: bodies: ", "no body"],
         {"case.toml": BASE[: BASE.index("[[bodies]]")] + BASE[BASE.index("[boundary]"):]}),

@@ -1,4 +1,5 @@
-"""The memory that `check` foretells is what a run takes, to 15 %: small and large, 2D and 3D, on one rank and two.
+"""The memory that `check` foretells is what a run takes, to 15 %: small and large, 2D and 3D, on one rank and two. Where
+a control group (containers, Slurm) or ulimit leaves less, `check` and `run` say so.
 
     test_memory.py CAIRN SCRATCH
 """
@@ -41,12 +42,57 @@ def held(cairn: Program, file: Path, out: Path, ranks: int) -> float:
     return statistics.median(totals)
 
 
+def control_group(limit: int) -> Path | None:
+    """A group below this process's own that may hold `limit` bytes; none where groups cannot be made."""
+    own = {kinds: path for _, kinds, path in (line.split(":", 2) for line in
+                                              Path("/proc/self/cgroup").read_text(encoding="ascii").splitlines())}
+    for mount, path, name in [("/sys/fs/cgroup/memory", own.get("memory"), "memory.limit_in_bytes"),
+                              ("/sys/fs/cgroup", own.get(""), "memory.max")]:
+        group = Path(f"{mount}{path}/cairn_test")
+        try:
+            group.mkdir(exist_ok=True)
+            if not (group / "cgroup.procs").exists():
+                raise FileNotFoundError(group)
+            (group / name).write_text(str(limit), encoding="ascii")
+            return group
+        except OSError:
+            continue
+    return None
+
+
+def limits(cairn: Program, scratch: Path) -> list[str]:
+    """Of a case of some 80 MB where there are 64 for it."""
+    limit = 64 << 20
+    file = scratch / "limited.toml"
+    file.write_text(CASE.format(dim=2, upper=[1.0] * 2, cells=[300] * 2, output="", bodies=BODY.format(
+        ball="disk", centre=[0.5, 0.5], radius=0.48)), encoding="utf-8")
+    group = control_group(limit)
+    print("control group:", group or "none can be made here")
+    problems = []
+    for command in ("check", "run"):
+        call = [cairn.exe, command, str(file), *(["--out", str(scratch / "limited"), "--overwrite"] * (command == "run"))]
+        enter = f"echo $$ > '{group}/cgroup.procs' && " if group else ""
+        # A rank that asks for more than the group has is ended by the system: the word must come before.
+        done = subprocess.run(["sh", "-c", enter + 'exec "$@"', "sh", *call], capture_output=True, text=True,
+                              check=False, timeout=300)
+        if group and "this machine has" not in done.stderr:
+            problems.append(f"{command} does not warn of a control group of {limit} bytes: {done.stderr}")
+    if group:
+        group.rmdir()
+    large = ["check", str(file), "--set", "domain.cells=4000"]  # some 9 GB
+    done = subprocess.run(["sh", "-c", 'ulimit -v 4000000; exec "$@"', "sh", cairn.exe, *large], capture_output=True,
+                          text=True, check=False, timeout=300)
+    if "this machine has 4.1 GB for it" not in done.stderr:
+        problems.append(f"check does not warn of ulimit: {done.returncode} {done.stdout} {done.stderr}")
+    return problems
+
+
 def main() -> int:
     cairn, scratch = Program(sys.argv[1]), fresh_folder(sys.argv[2])
     if cairn.sanitized:
         print("a sanitizer takes memory of its own")
         return SKIP
-    problems = []
+    problems = limits(cairn, scratch)
     for dim, cells, side, ranks, output in RUNS:
         bodies = [BODY.format(ball="disk" if dim == 2 else "sphere", centre=[(i + 0.5) / side for i in place],
                               radius=0.48 / side) for place in itertools.product(range(side), repeat=dim)]

@@ -59,6 +59,7 @@ VARIATIONS = {
     "pass_after": {"contact.passes": '"after"'},
     "no_fill": {"contact.fill": 0.0},
     "fill": {"contact.fill": 0.8},
+    "cpdi": {"solver.shape": '"cpdi"', "solver.motion": '"projected"'},
     "no_filter": {"solver.noise_filter": '"off"'},
     "xpic": {"solver.noise_filter": '"xpic"', "solver.noise_order": 2},
     "impulse_limit": {"contact.impulse_limit": 0.1},
@@ -150,7 +151,7 @@ def check_content(name: str, folder: Path, settings: dict) -> list[str]:
 
 
 def whole_cases(program: Program, scratch: Path, pool) -> list[str]:
-    """Both cases on every number of ranks with both partitions, and their resolved text again."""
+    """Both cases on every number of ranks with both partitions, along the curve, and their resolved text again."""
     problems, waiting = [], []
     for name, settings in CASES.items():
         case, reference = ROOT / "cases" / f"{name}.toml", scratch / f"{name}_1"
@@ -160,7 +161,7 @@ def whole_cases(program: Program, scratch: Path, pool) -> list[str]:
             continue
         resolved = reference / "case.toml"
         waiting.append(pool.submit(run_and_compare, program, resolved, {}, reference, scratch / f"{name}_again", 2))
-        for ranks, partition in itertools.product(RANKS, PARTITIONS):
+        for ranks, partition in [*itertools.product(RANKS, PARTITIONS), (3, "curve")]:
             changed = settings | {"parallel.partition": f'"{partition}"'}
             out = scratch / f"{name}_{ranks}_{partition}"
             waiting.append(pool.submit(run_and_compare, program, case, changed, reference, out, ranks))

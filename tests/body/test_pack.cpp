@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 #include <numbers>
 #include <numeric>
+#include <sstream>
 
 #include "cairn/body/pack.hpp"
 #include "cairn/core/error.hpp"

@@ -141,7 +141,8 @@ void check_symmetry(int side, ShapeFunction shape, NormalSource normals) {
 }
 TEST(SymmetryPlane, HalfABodyMovesLikeTheWhole) {
   for (int side : {0, 1})
-    for (ShapeFunction shape : {ShapeFunction::linear, ShapeFunction::gimp, ShapeFunction::bspline2})
+    for (ShapeFunction shape :
+         {ShapeFunction::linear, ShapeFunction::gimp, ShapeFunction::bspline2, ShapeFunction::cpdi})
       for (NormalSource normals : {NormalSource::volume_gradient, NormalSource::density}) {
         check_symmetry<2>(side, shape, normals);
         check_symmetry<3>(side, shape, normals);

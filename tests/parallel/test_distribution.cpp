@@ -9,6 +9,7 @@
 
 #include "../support/lattices.hpp"
 #include "../support/random.hpp"
+#include "cairn/parallel/balance.hpp"
 #include "cairn/parallel/distribution.hpp"
 
 namespace cairn {
@@ -74,6 +75,94 @@ TEST(Distribution, MetisCutsLessThanDealingOut) {
   EXPECT_LT(3 * cut(Partition::metis), cut(Partition::round_robin));
 }
 
+/// Equal work, connected along the curve, and cuts that stay where they are nearly right.
+template <int Dim>
+void check_curve(const Lattice<Dim>& lattice) {
+  const auto count = static_cast<std::size_t>(lattice.patch_count());
+  Random random;
+  std::vector<std::int64_t> work;
+  for (std::size_t p = 0; p < count; ++p) work.push_back(random.integer(500, 1500));
+  const auto patches = all_patches(lattice);
+  for (int ranks : {2, 3, 7, 16}) {
+    const auto first = distribute(lattice, work, ranks, Partition::curve);
+    const auto sum = loads(first, work, ranks);
+    const double mean = static_cast<double>(std::accumulate(work.begin(), work.end(), std::int64_t{0})) / ranks;
+    EXPECT_LE(*std::ranges::max_element(sum), mean + 1501) << ranks << " ranks";
+    EXPECT_GE(*std::ranges::min_element(sum), mean - 1501) << ranks << " ranks";
+    // Noise of a hundredth moves nothing where cuts are anchored.
+    auto noisy = work;
+    for (auto& w : noisy) w += w * random.integer(-10, 10) / 1000;
+    EXPECT_EQ(distribute_patches(lattice, patches, noisy, ranks, Partition::curve, first), first);
+    // Twice the work in the first rank's patches moves cuts, and the loads are even again.
+    for (std::size_t p = 0; p < count; ++p) noisy[p] *= first[p] == 0 ? 2 : 1;
+    const auto second = distribute_patches(lattice, patches, noisy, ranks, Partition::curve, first);
+    const auto after = loads(second, noisy, ranks);
+    const double new_mean = static_cast<double>(std::accumulate(noisy.begin(), noisy.end(), std::int64_t{0})) / ranks;
+    EXPECT_LE(*std::ranges::max_element(after), 1.1 * new_mean + 3000) << ranks << " ranks";
+  }
+}
+TEST(Distribution, TheCurveIsCutEvenlyAndItsCutsStay) {
+  check_curve(lattice_of<2>({128, 128}, {false, false}, 4));
+  check_curve(lattice_of<3>({40, 40, 40}, {true, false, false}, 4));
+}
+
+TEST(Distribution, OneHeavyPatchLeavesPatchesForAllRanks) {
+  const auto lattice = lattice_of<2>({40, 40}, {false, false}, 4);
+  for (std::size_t heavy : {0u, 37u, 99u}) {
+    std::vector<std::int64_t> work(100, 1);
+    work[heavy] = 1'000'000;
+    const auto owner = distribute(lattice, work, 9, Partition::curve);
+    EXPECT_EQ(std::set<int>(owner.begin(), owner.end()).size(), 9u);
+  }
+}
+
+/// More patches than METIS is asked to part on every rank.
+TEST(Distribution, ManyPatchesAreCutAlongTheCurve) {
+  const auto lattice = lattice_of<2>({800, 800}, {false, false}, 4);
+  ASSERT_GT(lattice.patch_count(), most_for_metis);
+  const std::vector<std::int64_t> work(lattice.patch_count(), 64);
+  EXPECT_EQ(distribute(lattice, work, 1000, Partition::metis), distribute(lattice, work, 1000, Partition::curve));
+}
+
+/// The naive way: the largest overlap of all, again and again.
+TEST(Balance, PartsStayWhereMostOfThemIs) {
+  Random random;
+  for (int ranks : {1, 2, 5, 12}) {
+    std::vector<int> parts, owner;
+    std::vector<std::int64_t> work;
+    for (int p = 0; p < 40; ++p) {
+      parts.push_back(random.integer(0, ranks - 1)), owner.push_back(random.integer(0, ranks - 1));
+      work.push_back(random.integer(0, 100));
+    }
+    std::vector<int> rank_of(ranks, -1);
+    std::set<int> taken;
+    for (int round = 0; round < ranks; ++round) {
+      std::int64_t most = -1;
+      std::pair<int, int> best;
+      for (int part = 0; part < ranks; ++part)
+        for (int rank = 0; rank < ranks; ++rank) {
+          if (rank_of[part] >= 0 || taken.contains(rank)) continue;
+          std::int64_t sum = 0;
+          for (std::size_t p = 0; p < parts.size(); ++p)
+            if (parts[p] == part && owner[p] == rank) sum += 1 + work[p];
+          if (sum > most) most = sum, best = {part, rank};
+        }
+      rank_of[best.first] = best.second, taken.insert(best.second);
+    }
+    const auto renamed = keep_in_place(parts, owner, work, ranks);
+    for (std::size_t p = 0; p < parts.size(); ++p) EXPECT_EQ(renamed[p], rank_of[parts[p]]);
+  }
+}
+
+/// Memory and time follow the patches, not the square of the ranks: a table of all pairs would take 240 GB here.
+TEST(Balance, ManyRanks) {
+  constexpr int ranks = 100'000;
+  std::vector<int> parts, owner;
+  for (int p = 0; p < 2 * ranks; ++p) parts.push_back(p / 2), owner.push_back((p / 2 + 7) % ranks);
+  const auto renamed = keep_in_place(parts, owner, std::vector<std::int64_t>(parts.size(), 10), ranks);
+  EXPECT_EQ(renamed, owner);
+}
+
 TEST(Distribution, RoundRobinDealsOutInTurn) {
   const auto lattice = lattice_of<2>({20, 12}, {true, false}, 4);
   const auto owner = distribute(lattice, std::vector<std::int64_t>(15, 1), 4, Partition::round_robin);
@@ -83,7 +172,7 @@ TEST(Distribution, RoundRobinDealsOutInTurn) {
 
 TEST(Distribution, FewPatchesGoToOneRankEach) {
   const auto lattice = lattice_of<2>({8, 8}, {true, true}, 4);
-  for (Partition partition : {Partition::metis, Partition::round_robin})
+  for (Partition partition : {Partition::metis, Partition::curve, Partition::round_robin})
     for (int ranks : {4, 5, 9}) {
       const auto owner = distribute(lattice, std::vector<std::int64_t>(4, 10), ranks, partition);
       EXPECT_EQ(std::set<int>(owner.begin(), owner.end()).size(), 4u);
@@ -93,7 +182,7 @@ TEST(Distribution, FewPatchesGoToOneRankEach) {
 
 TEST(Distribution, OneRankHoldsAll) {
   const auto lattice = lattice_of<2>({20, 12}, {true, false}, 4);
-  for (Partition partition : {Partition::metis, Partition::round_robin})
+  for (Partition partition : {Partition::metis, Partition::curve, Partition::round_robin})
     EXPECT_EQ(distribute(lattice, std::vector<std::int64_t>(15, 1), 1, partition), std::vector<int>(15, 0));
 }
 

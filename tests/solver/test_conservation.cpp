@@ -46,7 +46,7 @@ void check_momentum(const Case& c, int steps) {
 
 TEST(Conservation, MomentumInAnObliqueCollisionWithFriction) {
   for (Release release : {Release::reaction, Release::approach, Release::traction})
-    for (ShapeFunction shape : {ShapeFunction::gimp, ShapeFunction::bspline2}) {
+    for (ShapeFunction shape : {ShapeFunction::gimp, ShapeFunction::bspline2, ShapeFunction::cpdi}) {
       SCOPED_TRACE(testing::Message() << "release " << static_cast<int>(release) << ", shape "
                                       << static_cast<int>(shape));
       Case c = colliding_balls(2, 24, 6);
@@ -63,7 +63,12 @@ TEST(Conservation, MomentumForEveryStressUpdate) {
     check_momentum<2>(c, update == StressUpdate::last ? 60 : 100);
   }
 }
-TEST(Conservation, MomentumOfBalls) { check_momentum<3>(colliding_balls(3, 12, 4), 50); }
+TEST(Conservation, MomentumOfBalls) {
+  Case c = colliding_balls(3, 12, 4);
+  check_momentum<3>(c, 50);
+  c.solver.shape = ShapeFunction::cpdi, c.solver.motion = Motion::projected;
+  check_momentum<3>(c, 50);
+}
 TEST(Conservation, MomentumAcrossPeriodicBoundaries) {
   Case c = colliding_balls(2, 24, 12);
   c.domain.periodic = {true, true, false};

@@ -42,6 +42,7 @@ const std::vector<Setting>& settings() {
       {"first", [](Case& c) { c.solver.stress_update = StressUpdate::first; }},
       {"modified last", [](Case& c) { c.solver.stress_update = StressUpdate::modified_last; }},
       {"linear", [](Case& c) { c.solver.shape = ShapeFunction::linear, c.solver.spin = false; }},
+      {"CPDI", [](Case& c) { c.solver.shape = ShapeFunction::cpdi, c.solver.motion = Motion::projected; }},
       {"B-splines", [](Case& c) { c.solver.shape = ShapeFunction::bspline2; }},
       {"strong filter", [](Case& c) { c.solver.noise_filter = NoiseFilter::strong; }},
   };

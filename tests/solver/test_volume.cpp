@@ -1,10 +1,10 @@
 // Volumes of shapes in the domain, places that several images hold counted once.
 
-#include "cairn/solver/volume.hpp"
-
 #include <gtest/gtest.h>
 
 #include <numbers>
+
+#include "cairn/solver/volume.hpp"
 
 namespace cairn {
 namespace {

@@ -18,7 +18,7 @@ struct ToolSum {
   static constexpr int size = 7;
   std::array<double, size> total{};  // since the start: impulse [N s], its moment about the origin [N m s], work that
                                      // the tool did on bodies [J]
-  std::array<double, 6> last{};  // in the last step: impulse and moment
+  std::array<double, 6> last{};      // in the last step: impulse and moment
 
   /// Adds an impulse on the tool [N s] at x [m], and the work that it did [J].
   void add(const Vec3& impulse, const Vec3& x, double work) {

@@ -1,9 +1,9 @@
 #pragma once
 /// Laws of contact at a node, as pure functions. A body meets a partner: the rest of the node's bodies, a rigid body or
-/// a wall. Everything is said by the body's excess momentum and force over the partner's motion (Nairn 2013, eqs. 5 and 9
-/// with the opposite sign):
-///   P = p_a - (m_a/M) sum p,  F = f_a - (m_a/M) sum f        P = p_a - m_a v,  F = f_a  against a rigid partner of
-///   velocity v
+/// a wall. Everything is said by the body's excess momentum and force over the partner's motion (Nairn 2013, eqs. 5 and
+/// 9 with the opposite sign):
+///   P = p_a - (m_a/M) sum p,  F = f_a - (m_a/M) sum f
+///   P = p_a - m_a v,          F = f_a                    against a rigid partner of velocity v
 /// with n the unit normal out of the body. P . n > 0 means approach. Each function returns the impulse on the body.
 
 #include <cmath>

@@ -10,4 +10,7 @@ double available_memory();
 /// What this process may use: the lowest of its limits (ulimit -v, ulimit -m) [bytes]; infinite where there is none.
 double memory_limit();
 
+/// Ranks of this program on this machine, as the launcher says; 1 where it does not.
+int ranks_on_machine();
+
 }  // namespace cairn

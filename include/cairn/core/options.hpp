@@ -6,7 +6,7 @@
 
 namespace cairn {
 
-enum class ShapeFunction { linear, gimp, bspline2 };
+enum class ShapeFunction { linear, gimp, bspline2, cpdi };
 enum class StressUpdate { last, first, both, modified_last };
 enum class ContactLaw { none, stick, frictionless, friction };
 enum class Release { approach, traction, reaction };
@@ -19,6 +19,9 @@ enum class DepartingFriction { none, coulomb, printed };
 enum class Passes { both, before, after };
 /// What holds across the plane of a 2D case: no strain, or no stress.
 enum class Plane { strain, stress };
+/// What points move with, where momentum is projected again: the mean of the nodes' velocity after the momentum update
+/// and of that projected again, or the latter, which is what F integrates.
+enum class Motion { centred, projected };
 /// Volumes of points at the surface of round bodies: all the same, or what of the body they stand for.
 enum class Surface { whole, cut };
 /// How much of the points' motion that no node sees is taken away (src/solver/noise_filter.cpp).
@@ -30,7 +33,7 @@ enum class Leaving { remove, stop };
 enum class LostPoints { stop, drop };
 
 /// How patches are dealt to ranks; never changes a result.
-enum class Partition { metis, round_robin };
+enum class Partition { metis, curve, round_robin };
 
 struct ParallelOptions {
   Partition partition = Partition::metis;
@@ -44,6 +47,7 @@ struct SolverOptions {
   double flip = 1.0;        // 1: FLIP, 0: PIC
   bool spin = true;         // points carry an angular velocity
   int points_per_cell = 4;  // total; a square (2D) or cube (3D) number
+  Motion motion = Motion::centred;
   Surface surface = Surface::cut;
   NoiseFilter noise_filter = NoiseFilter::weak;
   int noise_order = 4;  // times that motion goes to the nodes and back before what is left counts as noise

@@ -23,13 +23,17 @@ struct LinearShape {
   }
 };
 
-/// Quadratic B-spline.
-struct QuadraticShape {
+/// The nodes that shapes of up to three of them take: the nearest and its neighbours.
+struct NodesOfGimp {
   static constexpr int nodes = 3;
   template <class T>
   static T first_node(T xi) {
     return round_down(xi + 0.5) - 1.0;
   }
+};
+
+/// Quadratic B-spline.
+struct QuadraticShape : NodesOfGimp {
   void evaluate(int /*d*/, Lanes xi, Lanes first, Lanes* value, Lanes* slope) const {
     const Lanes d = xi - first - 1.0;  // from the middle node, -1/2 to 1/2
     value[0] = 0.5 * (0.5 - d) * (0.5 - d), value[1] = 0.75 - d * d, value[2] = 0.5 * (0.5 + d) * (0.5 + d);
@@ -39,13 +43,9 @@ struct QuadraticShape {
 
 /// Generalised interpolation (Bardenhagen & Kober 2004): the hat function averaged over a point's own extent, which
 /// keeps its initial size ("uGIMP"). `half[d]` is half that extent, at most 1/2.
-struct GimpShape {
-  static constexpr int nodes = 3;
+struct GimpShape : NodesOfGimp {
   std::array<double, 3> half;
-  template <class T>
-  static T first_node(T xi) {
-    return round_down(xi + 0.5) - 1.0;
-  }
+  explicit GimpShape(const std::array<double, 3>& half_) : half(half_) {}
   void evaluate(int d, Lanes xi, Lanes first, Lanes* value, Lanes* slope) const {
     const double l = half[d], scale = 0.5 / l;
     for (int k = 0; k < nodes; ++k) {
@@ -126,7 +126,8 @@ struct Stencil {
   /// A point within a rounding error of where a shape function takes up the next node may do so or not, with the same
   /// weights. The compiler chooses how an expression is rounded at every place anew, so that whoever made the box may
   /// have chosen the other way: a node taken here lies in the box in any case.
-  Stencil(const Lattice<Dim>& lattice, const Shape& shape, const Box<Dim>& box, const double* const (&x)[Dim]) {
+  Stencil(const Lattice<Dim>& lattice, const Shape& shape, const Box<Dim>& box, const double* const (&x)[Dim],
+          int /*point*/ = 0) {
     Lanes offset{};
     for (int d = 0; d < Dim; ++d) {
       stride[d] = box.stride(d), inverse_spacing[d] = lattice.inverse_spacing()[d];

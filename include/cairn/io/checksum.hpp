@@ -1,17 +1,20 @@
 #pragma once
-/// A 64-bit checksum of bytes: XXH64 of Y. Collet (github.com/Cyan4973/xxHash, specification 0.2.0), seed 0. Several
-/// gigabytes a second; any change within eight neighbouring bytes changes it, and any other with all but certainty.
+/// A 64-bit checksum of bytes: XXH64 of libxxhash, seed 0. Several gigabytes a second; any change within eight
+/// neighbouring bytes changes it, and any other with all but certainty.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
+
+struct XXH64_state_s;
 
 namespace cairn {
 
 /// Checksum of bytes that come in parts; how they are cut does not matter.
 class Checksum {
  public:
+  Checksum();
   void add(std::span<const std::byte> bytes);
   template <class T>
   void add_values(std::span<const T> values) {
@@ -21,14 +24,10 @@ class Checksum {
   std::uint64_t value() const;
 
  private:
-  static constexpr std::size_t stripe = 32;
-  void mix(const std::byte* bytes);
-
-  static constexpr std::uint64_t prime_1 = 0x9E3779B185EBCA87ULL, prime_2 = 0xC2B2AE3D27D4EB4FULL;
-  std::array<std::uint64_t, 4> lanes_ = {prime_1 + prime_2, prime_2, 0, 0 - prime_1};
-  std::array<std::byte, stripe> rest_{};  // bytes that do not fill a stripe yet
-  std::size_t rest_size_ = 0;
-  std::uint64_t size_ = 0;
+  struct Free {
+    void operator()(XXH64_state_s* state) const;
+  };
+  std::unique_ptr<XXH64_state_s, Free> state_;
 };
 
 template <class T>

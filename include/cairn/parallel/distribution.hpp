@@ -12,13 +12,21 @@
 
 namespace cairn {
 
-/// Assigns patches to ranks: by METIS on their graph, weighted by their work and by the nodes they share; or dealt out
-/// in turn, which is bad on purpose, to show that results do not depend on it. Returns the rank of each.
+/// Assigns patches to ranks, each to one. Returns the rank of each patch. By Partition:
+/// - metis: on the graph of the patches, weighted by their work and by the nodes they share; beyond `most_for_metis`
+///   patches, as every rank does all of it, like
+/// - curve: cuts of a curve that fills the lattice, with equal work between them; a cut of `before` stays where it is
+///   right to a twentieth of a rank's work, so that few patches move;
+/// - round_robin: dealt out in turn, which is bad on purpose, to show that results do not depend on it.
 /// \param patches  ascending
 /// \param work     of each (its number of points), the same on every rank
+/// \param before   the ranks of the patches now, if they have any
 template <int Dim>
 std::vector<int> distribute_patches(const Lattice<Dim>& lattice, const std::vector<PatchId>& patches,
-                                    const std::vector<std::int64_t>& work, int ranks, Partition partition);
+                                    const std::vector<std::int64_t>& work, int ranks, Partition partition,
+                                    const std::vector<int>& before = {});
+
+inline constexpr std::ptrdiff_t most_for_metis = 1 << 14;
 
 template <int Dim>
 class PatchTable {

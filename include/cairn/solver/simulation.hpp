@@ -150,8 +150,8 @@ class Simulation {
   void keep_balance(bool keep) { keep_balance_ = keep; }
   /// Of the last step, the same on every rank.
   const ForceBalance& force_balance() const { return balance_; }
-  /// Where pouring stands: the next point's number, and for each [[insert]] how many of its bodies came, how often a place
-  /// was drawn, and when the next body may come [s].
+  /// Where pouring stands: the next point's number, and for each [[insert]] how many of its bodies came, how often a
+  /// place was drawn, and when the next body may come [s].
   std::vector<double> pouring() const;
   /// Goes on with what a stage changes: motions of tools, gravity, friction, damping, the length of steps, and what is
   /// kept for output. Collective.
@@ -202,10 +202,10 @@ class Simulation {
   void accelerate_points(Patch<Dim>& patch);
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
   void finish_points(Patch<Dim>& patch, double share);
-  void receive_points();  // communicates
+  void receive_points();      // communicates
   void exchange_tractions();  // communicates, where faces of cracks pull each other; before complete_forces
-  void move_cracks();     // communicates, where there are any
-  void receive_cracks();  // likewise
+  void move_cracks();         // communicates, where there are any
+  void receive_cracks();      // likewise
 
   // Between the stages: how tools move in the step (tools.cpp).
   void begin_tools();
@@ -391,17 +391,17 @@ class Simulation {
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
   std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
   std::vector<Crack> cracks_;
-  std::vector<CrackSegments<Dim>> segments_;                // for each patch
-  std::vector<std::vector<FaceMotion<Dim>>> face_motions_;  // for each patch: of its neighbours' crack points
-  std::vector<std::optional<TractionLaw>> traction_laws_;   // for each crack; empty where none has one
-  std::vector<std::vector<RowForce<Dim>>> row_forces_;      // for each patch: of tractions
+  std::vector<CrackSegments<Dim>> segments_;                      // for each patch
+  std::vector<std::vector<FaceMotion<Dim>>> face_motions_;        // for each patch: of its neighbours' crack points
+  std::vector<std::optional<TractionLaw>> traction_laws_;         // for each crack; empty where none has one
+  std::vector<std::vector<RowForce<Dim>>> row_forces_;            // for each patch: of tractions
   double traction_dt_ = std::numeric_limits<double>::infinity();  // longest step for which they are stable [s]
-  int split_every_ = 0;                                            // steps; 0: parts stay in their body
-  std::vector<double> parts_;                                      // bodies that those behind the case's came from
-  std::vector<GrowthSpec> growth_;                                 // of each crack
-  std::vector<Material> specs_;                             // of materials, where there are cracks
-  std::array<double, 2> j_radius_{};                        // [cells]
-  std::vector<double> crack_densities_;                     // of bodies; 0 for rigid ones [kg/m3]
+  int split_every_ = 0;                                           // steps; 0: parts stay in their body
+  std::vector<double> parts_;                                     // bodies that those behind the case's came from
+  std::vector<GrowthSpec> growth_;                                // of each crack
+  std::vector<Material> specs_;                                   // of materials, where there are cracks
+  std::array<double, 2> j_radius_{};                              // [cells]
+  std::vector<double> crack_densities_;                           // of bodies; 0 for rigid ones [kg/m3]
   std::unique_ptr<NeighbourExchange> messages_, traction_messages_;
   std::unique_ptr<NodeExchange<Dim>> exchange_;
   std::unique_ptr<Migration<Dim>> migration_;
@@ -413,7 +413,7 @@ class Simulation {
   std::vector<std::string> warnings_;
   std::int64_t patches_computed_ = 0;
   std::size_t blank_before_ = 0;  // patches without points or history when they were last forgotten
-  int times_balanced_ = 0;
+  int times_balanced_ = 0, looks_to_skip_ = 0, looks_skipped_ = 0;
   double seconds_balancing_ = 0;
   SpeedLimits speeds_;  // of this rank, in the step under way
   static constexpr int speed_size = 6;

@@ -34,7 +34,9 @@ struct TransferSettings {
   std::array<std::array<double, 2>, Dim> wall_from{}, wall_to{};
   bool extras = false;                              // stress and position sums are needed
   bool normals_needed = true;
+  std::vector<double> stretch;  // of bodies at the start, the measure of their domains with CPDI; empty: all 1
 
+  double stretch_of(int body) const { return stretch.empty() ? 1.0 : stretch[body]; }
   static TransferSettings make(const SolverOptions& solver, const ContactOptions& contact, const Vec<Dim>& gravity);
 };
 
@@ -43,6 +45,18 @@ struct SpeedLimits {
   double wave = 0, point = 0;
   std::int64_t stopped = 0;  // times that a point was kept from crossing a wall
 };
+
+/// Domains of points for CPDI (grid/cpdi.hpp): half vectors half_size F e_j in cells, F from the body's stretch at the
+/// start on; shortened along a direction in which they would reach further than half a cell.
+template <int Dim>
+AlignedDoubles domains_of(const Points<Dim>& points, double stretch, const Lattice<Dim>& lattice,
+                          const TransferSettings<Dim>& settings);
+inline std::ptrdiff_t domain_stride(int points) { return (points + lane_count - 1) / lane_count * lane_count; }
+
+/// With CPDI, sets the domains of a piece's points. They hold for a whole step, in which F changes: `project` sets
+/// them; whoever changes the order of points after it does so again.
+template <int Dim>
+void freeze_domains(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings);
 
 /// Sets the node box of a piece to what its points touch. Comes before `project`.
 template <int Dim>
@@ -121,6 +135,9 @@ void velocity_from_momentum(Piece<Dim>& piece);
 /// keep their angular momentum to second order in dt.
 template <int Dim>
 void centre_motion(Piece<Dim>& piece);
+/// nodes: the motion's velocity becomes that projected again.
+template <int Dim>
+void follow_projected(Piece<Dim>& piece);
 /// nodes -> points: velocities and spins less what NodeBox::velocity [m/s] shows of them, the adjoint of how they gave
 /// it momentum: v -= sum N u, w -= sum N arm x u / sum N arm^2.
 template <int Dim>
