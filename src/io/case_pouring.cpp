@@ -53,13 +53,16 @@ void read_times(Table& table, Insert& insert) {
   insert.seed = static_cast<std::uint64_t>(table.integer("seed", 1, 0, std::numeric_limits<std::int64_t>::max()));
 }
 
-/// The entry as it was given, with the copy of its table.
-std::string text_of(Table& table, const std::string& copy) {
+/// The entry as it was given, with the copies of its files.
+std::string text_of(Table& table, const Insert& insert, const Draft& draft) {
   std::string text;
+  const std::string& copy = draft.inserted_tables.back();
   for (const auto& key : table.keys()) {
-    const bool file = key == "file" && !copy.empty();
-    text += fmt::format("{} = {}\n", key,
-                        file ? inline_text(toml::value<std::string>(copy)) : inline_text(*table.find(key)));
+    std::string value = inline_text(*table.find(key));
+    if (key == "file" && !copy.empty()) value = inline_text(toml::value<std::string>(copy));
+    if (key == "shape" && insert.count > 0)
+      value = shape_text(draft.result.bodies[insert.first].shape, draft.result.domain.dimension);
+    text += fmt::format("{} = {}\n", key, value);
   }
   return text;
 }
@@ -125,7 +128,7 @@ void read_pouring(Table& root, Draft& draft, Errors& errors) {
         break;
       }
     }
-    insert.text = text_of(table, draft.inserted_tables.back());
+    insert.text = text_of(table, insert, draft);
     table.finish();
     c.inserts.push_back(std::move(insert));
   }

@@ -55,6 +55,8 @@ void read_output(Table output, const Draft& draft, Output& result);
 void read_materials(Table materials, int dimension, std::vector<Material>& result);
 /// The shape a table describes; nothing after an error.
 std::optional<Shape> read_shape(Table table, Draft& draft, Errors& errors);
+/// The shape as TOML on one line, with the copies of its files.
+std::string shape_text(const Shape& shape, int dimension);
 /// Unit, scale, move and rotate.
 Placement read_placement(Table& table, int dimension);
 void read_bodies(Table& root, Draft& draft, Errors& errors);

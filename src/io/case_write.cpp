@@ -50,8 +50,6 @@ std::string key_of(std::string_view name) {
   return !name.empty() && std::ranges::all_of(name, bare) ? std::string(name) : text_of(name);
 }
 
-std::string text_of(const Shape& shape, int dim);
-
 /// Writes the keys of a shape; the dimension decides the length of vectors.
 struct KeyWriter {
   int dim;
@@ -77,12 +75,14 @@ struct KeyWriter {
   }
 };
 
-std::string text_of(const Shape& shape, int dim) {
+}  // namespace
+
+std::string shape_text(const Shape& shape, int dim) {
   return std::visit(
       [&]<class S>(const S& s) -> std::string {
         if constexpr (std::is_same_v<S, Compound>) {
           std::string parts;
-          for (const Shape& part : s.of) parts += (parts.empty() ? "" : ", ") + text_of(part, dim);
+          for (const Shape& part : s.of) parts += (parts.empty() ? "" : ", ") + shape_text(part, dim);
           return fmt::format("{{ type = \"{}\", of = [{}] }}", name_of(compound_names, s.operation), parts);
         } else if constexpr (!std::is_same_v<S, LabelBody>) {
           KeyWriter keys{dim, fmt::format("type = \"{}\"", S::names.of(dim))};
@@ -94,6 +94,8 @@ std::string text_of(const Shape& shape, int dim) {
       },
       shape);
 }
+
+namespace {
 
 class Writer {
  public:
@@ -248,7 +250,7 @@ void write_bodies(Writer& out, const Draft& draft) {
   for (std::size_t i = 0; i < draft.shaped_bodies; ++i) {
     const BodySpec& body = c.bodies[i];
     out.section("[[bodies]]");
-    out.raw("shape", text_of(body.shape, c.domain.dimension));
+    out.raw("shape", shape_text(body.shape, c.domain.dimension));
     out.key("material", c.materials[body.material].name);
     out.motion(body.velocity, body.angular_velocity);
     out.key("initial_pressure", body.initial_pressure);
@@ -281,7 +283,7 @@ void write_bodies(Writer& out, const Draft& draft) {
   }
   for (const auto& remove : c.removes) {
     out.section("[[remove]]");
-    out.raw("region", text_of(remove.region, c.domain.dimension));
+    out.raw("region", shape_text(remove.region, c.domain.dimension));
     out.key("start", remove.start);
     if (std::isfinite(remove.end)) out.key("end", remove.end);
     out.key("every", remove.every);
