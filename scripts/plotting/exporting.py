@@ -85,7 +85,7 @@ def _rows(columns: dict[str, np.ndarray]) -> list[str]:
 
 def lammps(moments: list[Moment], folder: Path) -> list[str]:
     """OVITO knows the columns by their names; `AsphericalShape` are its own semi-axes, quati to quatw its orientation."""
-    names = {"body": "id", "quaternion_x": "quati", "quaternion_y": "quatj", "quaternion_z": "quatk", "quaternion_w": "quatw",
+    names = {"body": "id", **{f"quaternion_{own}": f"quat{theirs}" for own, theirs in zip("xyzw", "ijkw")},
              **{f"semi_axis_{k + 1}": f"AsphericalShape.{'XYZ'[k]}" for k in range(3)},
              **{f"stress_{name}": f"c_stress[{k + 1}]" for k, name in enumerate(("xx", "yy", "zz", "xy", "xz", "yz"))}}
     with whole_file(folder / "grains.dump") as draft, open(draft, "w", encoding="ascii") as file:
@@ -166,8 +166,8 @@ def extended_xyz(moments: list[Moment], folder: Path) -> list[str]:
     with whole_file(folder / "grains.xyz") as draft, open(draft, "w", encoding="ascii") as file:
         for moment in moments:
             b, box = moment.bodies, moment.box()
-            parts = [("id", "I", b.body[:, None]), ("pos", "R", b.centre), ("velo", "R", b.velocity), ("mass", "R", b.mass[:, None]),
-                     ("radius", "R", b.radius[:, None]), ("aspherical_shape", "R", b.semi_axes),
+            parts = [("id", "I", b.body[:, None]), ("pos", "R", b.centre), ("velo", "R", b.velocity),
+                     ("mass", "R", b.mass[:, None]), ("radius", "R", b.radius[:, None]), ("aspherical_shape", "R", b.semi_axes),
                      ("orientation", "R", b.quaternion)]
             if b.stress is not None:
                 parts.append(("stress_tensor", "R", b.stress[:, (0, 1, 2, 3, 5, 4)]))  # xx yy zz xy xz yz
@@ -178,7 +178,8 @@ def extended_xyz(moments: list[Moment], folder: Path) -> list[str]:
             file.write(f'{len(b.body)}\nLattice="{cell}" Origin="{origin}" pbc="{sides}" Time={moment.frame.time:.12g} '
                        f"Step={moment.frame.step} Properties=species:S:1:{kinds}\n")
             for row in zip(*[values.tolist() for _, _, values in parts]):
-                file.write("G " + " ".join(f"{v:.9g}" if isinstance(v, float) else str(v) for cells in row for v in cells) + "\n")
+                values = [value for cells in row for value in cells]
+                file.write("G " + " ".join(f"{v:.9g}" if isinstance(v, float) else str(v) for v in values) + "\n")
     return ["grains.xyz"]
 
 

@@ -226,7 +226,8 @@ def force_chains(run: Run, other: Run | None, folder: Path, summary: dict) -> li
                            colors=np.where(net.strong[:, None], STRONG, WEAK)[order])
     axes.add_collection(drawn, autolim=False)
     factor, unit = prefixed(net.top, "N/m")
-    axes.plot([], [], color=STRONG, lw=3, label=f"{net.mean * factor:.3g} {unit} (mean) to {net.top * factor:.3g} {unit} (widest)")
+    mean, top = (f"{force * factor:.3g} {unit}" for force in (net.mean, net.top))
+    axes.plot([], [], color=STRONG, lw=3, label=f"{mean} (mean) to {top} (widest)")
     axes.plot([], [], color=WEAK, lw=1, label="weaker than the mean")
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, frameon=False,
                 title=net.title, title_fontsize=8)
@@ -240,7 +241,8 @@ def values(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str
         _first_frame(run)
     if any(frame.points == 0 for frame in frames):
         raise MissingData("there are no points any more")
-    names = [f"{run.look.colour}.png" if len(frames) == 1 else f"{run.look.colour}_{frame.step:06d}.png" for frame in frames]
+    name = "bodies" if run.look.colour == "body" else run.look.colour
+    names = [f"{name}.png" if len(frames) == 1 else f"{name}_{frame.step:06d}.png" for frame in frames]
     if run.dimension == 3:
         scene = Scene(run, run.look, frames)
         for frame, name in zip(frames, names):

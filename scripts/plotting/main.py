@@ -55,14 +55,17 @@ def arguments() -> argparse.Namespace:
     space.add_argument("--colour", default="body", metavar="VALUE",
                        help="draw VALUE.png, and the film, in colours of a value: " + ", ".join(SCALARS) +
                        ", or any field of the files with one component")
-    space.add_argument("--range", type=float, nargs=2, metavar=("LOW", "HIGH"), help="ends of its colour scale, in SI units")
+    space.add_argument("--range", type=float, nargs=2, metavar=("LOW", "HIGH"),
+                       help="ends of its colour scale, in SI units")
     space.add_argument("--clip", action="append", default=[], metavar="KEPT",
-                       help="3D: cut bodies open and keep what is there, as x<0.3 (metres), or x< for half; may be repeated")
-    space.add_argument("--azimuth", type=float, help="3D: degrees about the vertical axis; default: 35, or so that cuts are seen")
+                       help="3D: cut bodies open and keep what is there, as x<0.3 (metres), or x< for half; up to 3 times")
+    space.add_argument("--azimuth", type=float,
+                       help="3D: degrees about the vertical axis; default: 35, or so that cuts are seen")
     space.add_argument("--elevation", type=float, help="3D: degrees above the horizon (22)")
     space.add_argument("--zoom", type=float, default=1.0, help="3D: 2 shows half the width")
     space.add_argument("--perspective", action="store_true", help="3D: what is near looks larger")
-    space.add_argument("--size", type=int, nargs=2, default=(900, 700), metavar=("WIDTH", "HEIGHT"), help="3D: pixels (900 700)")
+    space.add_argument("--size", type=int, nargs=2, default=(900, 700), metavar=("WIDTH", "HEIGHT"),
+                       help="3D: pixels (900 700)")
     return parser.parse_args()
 
 

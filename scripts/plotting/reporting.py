@@ -99,7 +99,8 @@ def warnings(run: Run) -> list[str]:
     worst = float(np.nanmax(np.abs(history.get("energy_error", np.zeros(1)))))
     if worst > BALANCED or not np.isfinite(worst):
         found.append(f"The energy book is off by up to {100 * worst:.2g} % of the largest energy.")
-    found += [f"{history[name][-1]:.0f} {words}." for name, words in COUNTS.items() if name in history and history[name][-1] > 0]
+    found += [f"{history[name][-1]:.0f} {words}." for name, words in COUNTS.items()
+              if name in history and history[name][-1] > 0]
     if any(not np.isfinite(column).all() for column in history.values()):
         found.append("history.csv holds values that are not numbers.")
     return found
@@ -144,7 +145,9 @@ def provenance(run: Run) -> str:
 
 def image(path: Path, caption: str) -> str:
     data = base64.b64encode(path.read_bytes()).decode("ascii")
-    return f'<figure><img alt="{html.escape(caption)}" src="data:image/png;base64,{data}"><figcaption>{html.escape(caption)}</figcaption></figure>'
+    words = html.escape(caption)
+    return (f'<figure><img alt="{words}" src="data:image/png;base64,{data}">'
+            f"<figcaption>{words}</figcaption></figure>")
 
 
 def pictures(run: Run, folder: Path) -> str:
@@ -169,7 +172,8 @@ def energies(run: Run, folder: Path) -> str:
     except MissingData as reason:
         return f"<p>{html.escape(str(reason))}</p>"
     unit = "J/m" if run.dimension == 2 else "J"
-    accounts = [name for name in history if name.endswith(("_energy", "_dissipation")) or name in ("boundary_work", "contact_gain", "energy_left")]
+    accounts = [name for name in history if name.endswith(("_energy", "_dissipation"))
+                or name in ("boundary_work", "contact_gain", "energy_left")]
     rows = [(name.replace("_", " "), quantity(float(history[name][0]), unit), quantity(float(history[name][-1]), unit),
              quantity(float(np.nanmax(np.abs(history[name]))), unit)) for name in accounts]
     worst = float(np.nanmax(np.abs(history.get("energy_error", np.zeros(1)))))
@@ -179,29 +183,21 @@ def energies(run: Run, folder: Path) -> str:
 
 def forces(run: Run, folder: Path) -> str:
     """Forces on tools over time, from their impulses, and what they add up to."""
-    path = run.folder / "forces.csv"
-    if not path.is_file():
-        return "<p>There is no forces.csv (see output.forces).</p>"
-    with reading(path):
-        names, *rows = [line.split(",") for line in path.read_text(encoding="utf-8").rpartition("\n")[0].splitlines()] or [[]]
-        if any(len(row) != len(names) for row in rows) or "impulse_x" not in names:
-            raise ValueError("its lines are not those of a run")
-        column = {name: [row[k] for row in rows] for k, name in enumerate(names)}
-        tools = list(dict.fromkeys(column["name"]))
-        values = {name: np.array(column[name], float) for name in ("time", "work", "impulse_x", "impulse_y", "impulse_z")}
-    at = np.array(column["name"])
+    try:
+        tools = run.forces()
+    except MissingData as reason:
+        return f"<p>{html.escape(str(reason))}</p>"
     figure, panels = plt.subplots(run.dimension, 1, figsize=(8, 2.4 * run.dimension), sharex=True)
     unit, rows = "N/m" if run.dimension == 2 else "N", []
-    for tool in tools[:MOST_ROWS]:
-        mine = at == tool
-        time, ends = values["time"][mine], [tool]
+    for tool, columns in list(tools.items())[:MOST_ROWS]:
+        time, ends = columns["time"], [tool]
         for axis, axes in zip("xyz", panels):
-            impulse = values[f"impulse_{axis}"][mine]
+            impulse = columns[f"impulse_{axis}"]
             if len(time) > 1:
                 axes.step(time[1:], np.diff(impulse) / np.maximum(np.diff(time), 1e-300), where="pre", lw=1, label=tool)
             axes.set_ylabel(f"force along {axis} [{unit}]")
             ends.append(quantity(float(impulse[-1]), unit.replace("N", "N s")))
-        rows.append([*ends, quantity(float(values["work"][mine][-1]), "J/m" if run.dimension == 2 else "J")])
+        rows.append([*ends, quantity(float(columns["work"][-1]), "J/m" if run.dimension == 2 else "J")])
     panels[-1].set_xlabel("time [s]")
     panels[0].legend(fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0, 1.02), frameon=False)
     figure.savefig(folder / "forces.png", dpi=120, bbox_inches="tight")
@@ -216,15 +212,17 @@ def measures(run: Run) -> str:
     if not script.is_file():
         return ""
     done = subprocess.run([script, run.folder], capture_output=True, text=True, check=False)
-    words = done.stdout if done.returncode == 0 else done.stderr.replace("measure: ", "")
-    return f"<h2>Measures</h2><pre>{html.escape(words.strip())}</pre>"
+    missing = sorted({line.removeprefix("measure: ") for line in done.stderr.splitlines()})
+    return (f"<h2>Measures of the last output</h2><pre>{html.escape(done.stdout.strip())}</pre>"
+            + table([(line,) for line in missing]))
 
 
 def page(run: Run) -> str:
     """The whole page."""
     title = html.escape(run.title)
     found = warnings(run)
-    listed = "<ul class=warning>" + "".join(f"<li>{html.escape(words)}</li>" for words in found) + "</ul>" if found else "<p>None.</p>"
+    items = "".join(f"<li>{html.escape(words)}</li>" for words in found)
+    listed = f"<ul class=warning>{items}</ul>" if found else "<p>None.</p>"
     with tempfile.TemporaryDirectory(prefix="cairn-report-") as drafts:
         folder = Path(drafts)
         parts = [("Warnings", listed), ("What was computed", summary(run)), ("Pictures", pictures(run, folder)),
@@ -232,7 +230,8 @@ def page(run: Run) -> str:
     with reading(run.folder / "case.toml"):
         case = (run.folder / "case.toml").read_text(encoding="utf-8")
     body = "".join(f"<h2>{name}</h2>{content}" for name, content in parts) + measures(run)
-    return (f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{title}</title><style>{STYLE}</style></head><body>'
+    return (f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>'
+            f"<style>{STYLE}</style></head><body>"
             f"<h1{' class=warning' if run.failed else ''}>{title}</h1>{body}<h2>Program and machine</h2>{provenance(run)}"
             f"<h2>Case, with all defaults</h2><pre>{html.escape(case)}</pre></body></html>\n")
 

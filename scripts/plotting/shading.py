@@ -104,7 +104,8 @@ def silhouettes(buffers: Buffers, owner: np.ndarray, step: float) -> np.ndarray:
 
 def shade(buffers: Buffers, camera: Camera, colour: np.ndarray, cut: np.ndarray, shadows: Shadows, line: np.ndarray,
           radius: float, grain: float, exact: bool) -> np.ndarray:
-    """Picture (rows x columns x 3, 0 to 1) from the colour of each pixel and the silhouettes (`line`); `grain` [m]: how far crevices reach.
+    """Picture (rows x columns x 3, 0 to 1) from the colour of each pixel and the silhouettes (`line`); `grain` [m]: how
+    far crevices reach.
 
     `exact`: colours are values, to be read against a scale, so that light changes them little and cut faces not at all.
     """

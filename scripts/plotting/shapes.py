@@ -60,8 +60,8 @@ class Shapes:
         mass = frame.field("mass") if frame.has("mass") else weight
         velocity = frame.field("velocity") if frame.has("velocity") else np.zeros((frame.points, 3))
         stress = frame.field("stress") if frame.has("stress") else None
-        return Bodies(bodies, centre, _means(which, velocity, mass, count), np.bincount(which, weights=mass, minlength=count),
-                      np.bincount(which, weights=weight, minlength=count), semi, quaternions(axes),
+        total, volume = (np.bincount(which, weights=values, minlength=count) for values in (mass, weight))
+        return Bodies(bodies, centre, _means(which, velocity, mass, count), total, volume, semi, quaternions(axes),
                       None if stress is None else _means(which, stress, weight, count), dimension)
 
     def _relative(self, frame: Frame):
@@ -134,8 +134,8 @@ def quaternions(rotation: np.ndarray) -> np.ndarray:
     k = np.empty((len(r), 4, 4))
     k[:, 0, 0], k[:, 1, 1] = r[:, 0, 0] - r[:, 1, 1] - r[:, 2, 2], r[:, 1, 1] - r[:, 0, 0] - r[:, 2, 2]
     k[:, 2, 2], k[:, 3, 3] = r[:, 2, 2] - r[:, 0, 0] - r[:, 1, 1], np.trace(r, axis1=1, axis2=2)
-    for (i, j), value in {(0, 1): r[:, 0, 1] + r[:, 1, 0], (0, 2): r[:, 0, 2] + r[:, 2, 0], (1, 2): r[:, 1, 2] + r[:, 2, 1],
-                          (0, 3): r[:, 2, 1] - r[:, 1, 2], (1, 3): r[:, 0, 2] - r[:, 2, 0],
+    for (i, j), value in {(0, 1): r[:, 0, 1] + r[:, 1, 0], (0, 2): r[:, 0, 2] + r[:, 2, 0],
+                          (1, 2): r[:, 1, 2] + r[:, 2, 1], (0, 3): r[:, 2, 1] - r[:, 1, 2], (1, 3): r[:, 0, 2] - r[:, 2, 0],
                           (2, 3): r[:, 1, 0] - r[:, 0, 1]}.items():
         k[:, i, j] = k[:, j, i] = value
     vectors = np.linalg.eigh(k)[1][:, :, 3]

@@ -102,11 +102,11 @@ def chosen_points(run: Run, frame: Frame, most: int) -> tuple[Points, np.ndarray
     step = -(-len(order) // most)
     order = order[::step]
     ids = frame.field("id")[order] if frame.has("id") else order
-    place = unwrapped(run, position[order], which[order], len(bodies))
+    place = untorn(run, position[order], which[order], len(bodies))
     return Points(ids, which[order], bodies, place, run.point_spacing * step ** (1 / run.dimension), step), order
 
 
-def unwrapped(run: Run, position: np.ndarray, which: np.ndarray, count: int) -> np.ndarray:
+def untorn(run: Run, position: np.ndarray, which: np.ndarray, count: int) -> np.ndarray:
     """Positions as seen from one point of each body, across periodic boundaries."""
     first = np.zeros(count, int)
     first[which[::-1]] = np.arange(len(which))[::-1]
@@ -225,7 +225,7 @@ class Page:
             now[known] = frame.field("position")[at[known]]
         count = len(self.points.bodies)
         if self.run.periodic.any():
-            now = unwrapped(self.run, now, self.points.body, count)
+            now = untorn(self.run, now, self.points.body, count)
         return affine(self.start, now, self.points.body, count, known), at, known
 
     def _blocks(self, kept: list[int]) -> dict[str, np.ndarray]:
@@ -236,7 +236,7 @@ class Page:
             frame = self.frames[k]
             now = frame.field("position").astype(float)[at] if frame.points else self.start.copy()
             if self.run.periodic.any():
-                now = unwrapped(self.run, now, self.points.body, count)
+                now = untorn(self.run, now, self.points.body, count)
             mine = maps[self.points.body]
             off = now - np.einsum("nij,nj->ni", mine[:, :, :3], self.start) - mine[:, :, 3]
             if self.run.periodic.any():

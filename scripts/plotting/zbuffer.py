@@ -90,7 +90,8 @@ def _hidden(discs: _Discs, camera: Camera) -> np.ndarray:
     around = front.copy()
     for i in (-1, 0, 1):
         for j in (-1, 0, 1):
-            around[1:-1, 1:-1] = np.minimum(around[1:-1, 1:-1], front[1 + i : shape[0] - 1 + i, 1 + j : shape[1] - 1 + j])
+            beside = front[1 + i : shape[0] - 1 + i, 1 + j : shape[1] - 1 + j]
+            around[1:-1, 1:-1] = np.minimum(around[1:-1, 1:-1], beside)
     return discs.towards < around[row, column] - 3 * radius
 
 
