@@ -16,25 +16,25 @@ namespace {
 
 /// What a piece's points have of motion: kinetic energy of velocities and of spins [J], and half a step's work of
 /// gravity [J], by which kinetic and potential energy are apart as velocities and positions are.
-struct Motion {
+struct NetMotion {
   double moving = 0, spinning = 0, ahead = 0;
-  Motion& operator+=(const Motion& other) {
+  NetMotion& operator+=(const NetMotion& other) {
     moving += other.moving, spinning += other.spinning, ahead += other.ahead;
     return *this;
   }
   double kinetic() const { return moving + spinning; }
   /// What has gone of it, into the book. Of spins the book takes what they have.
-  void book(PatchLedger& ledger, const Motion& after) const {
+  void book(PatchLedger& ledger, const NetMotion& after) const {
     ledger.damped += kinetic() - after.kinetic();
     ledger.blended_and_spun += ahead - after.ahead - (spinning - after.spinning);
   }
 };
 
 template <int Dim>
-Motion motion_of(const Piece<Dim>& piece, double density,
+NetMotion motion_of(const Piece<Dim>& piece, double density,
                  const std::vector<std::array<double, spin_size<Dim>>>& inertia, const Vec<Dim>& gravity, double dt) {
   using C = PointColumns<Dim>;
-  Motion motion;
+  NetMotion motion;
   for (int p = 0; p < piece.points.size(); ++p) {
     const double half_mass = 0.5 * density * piece.points.column(C::volume)[p];
     for (int d = 0; d < Dim; ++d) {
@@ -84,7 +84,7 @@ void Simulation<Dim>::damp(Patch<Dim>& patch, Piece<Dim>& piece) {
   if (!(damping_.local > 0 || damping_.viscous > 0) || is_rigid(piece) || piece.points.size() == 0) return;
   const double density = material_of(piece).density, fading = std::exp(-damping_.viscous * dt_);
   const auto inertia = spin_inertia(piece, lattice_, transfer_);
-  const Motion before = motion_of(piece, density, inertia, transfer_.gravity, dt_);
+  const NetMotion before = motion_of(piece, density, inertia, transfer_.gravity, dt_);
   if (damping_.local > 0) {
     const auto kinematics = point_kinematics(piece, lattice_, transfer_);
     for (int p = 0; p < piece.points.size(); ++p)
@@ -105,10 +105,10 @@ template <int Dim>
 void Simulation<Dim>::relax() {
   if (!damping_.relax) return;
   std::vector<double> mine;
-  std::vector<Motion> motions;
+  std::vector<NetMotion> motions;
   for (const auto& patch : patches_) {
     if (patch.point_count() == 0) continue;
-    Motion sum;
+    NetMotion sum;
     for (const auto& piece : patch.pieces) {
       if (is_rigid(piece)) continue;
       const auto inertia = spin_inertia(piece, lattice_, transfer_);
