@@ -8,8 +8,10 @@ foreach(level IN LISTS levels)
     install(TARGETS cairn_${level} RUNTIME DESTINATION libexec/cairn)
   endif()
 endforeach()
-install(PROGRAMS scripts/plot scripts/python scripts/compare-runs scripts/convert-grains scripts/convert-labels DESTINATION libexec/cairn)
-install(DIRECTORY scripts/plotting scripts/converting DESTINATION libexec/cairn FILES_MATCHING PATTERN *.py)
+install(PROGRAMS scripts/plot scripts/measure scripts/python scripts/compare-runs scripts/convert-grains
+        scripts/convert-labels scripts/convert-cells DESTINATION libexec/cairn)
+install(DIRECTORY scripts/plotting scripts/measuring scripts/converting DESTINATION libexec/cairn
+        FILES_MATCHING PATTERN *.py)
 install(DIRECTORY cases DESTINATION share/cairn)
 install(DIRECTORY docs/ DESTINATION share/doc/cairn FILES_MATCHING PATTERN *.md)
 install(FILES README.md LICENSE ARCHITECTURE.md CONTRIBUTING.md DESTINATION share/doc/cairn)

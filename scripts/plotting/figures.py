@@ -15,6 +15,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+import laboratory
 import raster
 from results import Frame, MissingData, Run, Shear, displacement, principal_stress_difference
 
@@ -278,4 +279,4 @@ def _compare_plastic_work(run: Run, other: Run | None, summary: dict) -> None:
         summary["plastic_work_ratio_to_this_run"] = {other.folder.name: work[1] / work[0]}
 
 
-FIGURES = (grains_start, grains_later, principal_stress, displacement_profile, energy)
+FIGURES = (grains_start, grains_later, principal_stress, displacement_profile, energy, *laboratory.FIGURES)

@@ -19,6 +19,10 @@ PICTURES = """pictures:
   principal_stress.png      principal stress difference: force chains
   displacement_profile.png  average displacement across the sheared layer, and the shear band
   energy.png                the energy book
+  force_displacement.png    force on tools that move (forces.csv)
+  stress_strain.png, coordination.png, force_distribution.png, fabric_rose.png, profiles.png
+                            measures of grains and contacts (docs/measures.md)
+  outflow.png               mass that left through free faces
   film.mp4 or film.gif      with --film
   photoelastic.png          with --fringes PA: dark fringes of equal shear stress (2D), and nothing else is drawn
 A picture whose data the run does not hold is skipped with a note."""

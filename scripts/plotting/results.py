@@ -16,11 +16,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-FACES = ("left", "right", "bottom", "top", "back", "front")  # axis = index // 2
-
+from bodies import FACES, BodyTable, read_bodies
 
 COMPONENTS = {"position": 3, "velocity": 3, "spin": 3, "image": 3, "stress": 6, "stress_smooth": 6,
-              "deformation_gradient": 9}  # of fields; the others have one
+              "deformation_gradient": 9,
+              "centre": 3, "angular_velocity": 3, "mean_stress": 6, "second_moment": 6,  # of bodies
+              "point": 3, "normal": 3, "force": 3, "moment": 9}  # of contacts; other fields have one
 
 
 class MissingData(Exception):
@@ -64,7 +65,7 @@ class Shear:
 
 
 class Frame:
-    """Material points at one time. Fields are read when asked for, and not kept."""
+    """Material points at one time, or bodies, or contacts. Fields are read when asked for, and not kept."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -84,7 +85,8 @@ class Frame:
         """One value or row for each point: position (N x 3) [m], velocity (N x 3) [m/s],
         stress (N x 6: xx yy zz xy yz xz) [Pa], volume (N) [m3, m2 in 2D], body, id, image (N x 3), ..."""
         if not self.has(name):
-            raise MissingData(f"{self.path.name} holds no field '{name}' (see output.particles.fields)")
+            where = " (see output.particles.fields)" if self.path.name.startswith("particles") else ""
+            raise MissingData(f"{self.path.name} holds no field '{name}'{where}")
         with reading(self.path), h5py.File(self.path, "r") as file:
             group = file["VTKHDF"] if "VTKHDF" in file else file
             values = (group["Points"] if name == "position" else group["PointData"][name])[()]
@@ -133,10 +135,12 @@ class Run:
         sizes = (self.upper - self.lower) / self.cells
         if sizes.shape != (self.dimension,) or not (np.isfinite(sizes) & (sizes > 0)).all():
             raise ValueError("the domain has no size, or its cells have none")
-        self.gravity = self._vector(domain.get("gravity"))  # [m/s2]
+        gravity = domain.get("gravity")
+        self.gravity = self._vector(None if _varies(gravity) else gravity)  # [m/s2]
         self.title = str(case.get("title") or self.folder.resolve().name)
         self._velocities = self._face_velocities()
-        self._prescribed = [self._vector(drive.get("velocity")) for drive in case.get("drive", [])]  # [m/s]
+        self._prescribed = [self._vector(drive.get("velocity")) for drive in case.get("drive", [])
+                            if "piston" not in drive and not _varies(drive.get("velocity"))]  # [m/s]
         if not self.point_spacing > 0:
             raise ValueError(f"solver.points_per_cell gives a spacing of {self.point_spacing}")
 
@@ -190,10 +194,12 @@ class Run:
         """Velocity [m/s] of every face that is fixed, is a wall, or carries driven bodies."""
         velocities = {}
         for face, condition in self.case.get("boundary", {}).items():
-            if isinstance(condition, dict) and condition.get("type") in ("fixed", "wall"):
+            if isinstance(condition, dict) and condition.get("type") in ("fixed", "wall") and not _varies(
+                    condition.get("velocity")):
                 velocities[face] = self._vector(condition.get("velocity"))
         for drive in self.case.get("drive", []):
-            if face := drive.get("bodies", drive).get("overlapping"):
+            face = drive.get("bodies", drive).get("overlapping")
+            if face and "piston" not in drive and not _varies(drive.get("velocity")):
                 velocities[face] = self._vector(drive.get("velocity"))
         return velocities
 
@@ -246,11 +252,43 @@ class Run:
         factor = {2: 4 / np.pi, 3: 6 / np.pi}[self.dimension]
         return float(np.mean((factor * volume[free]) ** (1 / self.dimension)))
 
+    @cached_property
+    def bodies(self) -> BodyTable:
+        """Materials, groups and extents of the bodies, and which are tools."""
+        with reading(self.folder / "case.toml"):
+            return read_bodies(self.case, self.folder)
+
+    @cached_property
+    def grains(self) -> list[Frame]:
+        """The files with a row for each body."""
+        return self._outputs("grains")
+
+    @cached_property
+    def contacts(self) -> list[Frame]:
+        """The files with a row for each contact."""
+        return self._outputs("contacts")
+
+    def _outputs(self, name: str) -> list[Frame]:
+        files = [Frame(path) for path in sorted(self.folder.glob(f"{name}_*.h5"))]
+        if not files:
+            raise MissingData(f"there are no {name}_*.h5 files (see output.{name})")
+        return files
+
     def history(self) -> dict[str, np.ndarray]:
         """Columns of history.csv by name."""
-        path = self.folder / "history.csv"
+        return self._table("history")
+
+    def forces(self) -> dict[str, dict[str, np.ndarray]]:
+        """Columns of forces.csv by name, for each tool by its name."""
+        table = self._table("forces", text=("name",))
+        names = table.pop("name")
+        return {str(name): {key: column[names == name] for key, column in table.items()} for name in np.unique(names)}
+
+    def _table(self, name: str, text: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
+        """Columns of a CSV file of numbers by name; those in `text` are words."""
+        path = self.folder / f"{name}.csv"
         if not path.is_file():
-            raise MissingData("there is no history.csv (see output.history)")
+            raise MissingData(f"there is no {path.name} (see output.{name})")
         with reading(path):
             whole = path.read_text(encoding="utf-8").rpartition("\n")[0]  # a run that was killed may leave part of a line
             names, *rows = list(csv.reader(whole.splitlines())) or [[]]
@@ -258,12 +296,18 @@ class Run:
                 raise ValueError("it has no column 'time'")
             if any(len(row) != len(names) for row in rows):
                 raise ValueError("its lines are not equally long")
-            table = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(names))
-            if not np.isfinite(table[:, names.index("time")]).all():
+            if not rows:
+                raise MissingData(f"{path.name} has no rows")
+            table = {key: np.array(column) if key in text else np.array(column, float)
+                     for key, column in zip(names, zip(*rows))}
+            if not np.isfinite(table["time"]).all():
                 raise ValueError("a time is not finite")
-        if len(table) == 0:
-            raise MissingData("history.csv has no rows")
-        return dict(zip(names, table.T))
+        return table
+
+
+def _varies(velocity) -> bool:
+    """A velocity that changes with time: rows of a table, or formulas among its components."""
+    return isinstance(velocity, list) and any(isinstance(component, (list, str)) for component in velocity)
 
 
 def principal_stress_difference(stress: np.ndarray) -> np.ndarray:
@@ -282,10 +326,11 @@ def displacement(run: Run, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     match = order[np.minimum(np.searchsorted(start_ids, ids, sorter=order), len(order) - 1)]
     if not np.array_equal(start_ids[match], ids):
         raise MissingData(f"{frame.path.name} holds points that the first frame does not")
-    return _unwrapped(run, frame) - _unwrapped(run, start)[match], match
+    return unwrapped(run, frame) - unwrapped(run, start)[match], match
 
 
-def _unwrapped(run: Run, frame: Frame) -> np.ndarray:
+def unwrapped(run: Run, frame: Frame) -> np.ndarray:
+    """Positions [m] that go on across periodic faces (N x dimension)."""
     position = frame.field("position")[:, : run.dimension].astype(float)
     if run.periodic.any():
         position = position + frame.field("image")[:, : run.dimension] * (run.upper - run.lower) * run.periodic

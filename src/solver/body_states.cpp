@@ -1,6 +1,7 @@
 #include "cairn/solver/body_states.hpp"
 
 #include <bit>
+#include <cmath>
 #include <map>
 
 namespace cairn {
@@ -48,9 +49,9 @@ Shares shares_of(const Simulation<Dim>& simulation) {
 }
 
 /// Moments of a piece about its body's first centre: mass, m r, m v, m r x v, m r r^T (6), V sigma (6), V, and the
-/// inertia of the points' own spin (3), and the number of points.
+/// inertia of the points' own spin (3), the number of points, and their own second moment, of each as a cube.
 struct Moments {
-  static constexpr int size = 27;
+  static constexpr int size = 28;
   std::array<double, size> m{};
 };
 
@@ -73,7 +74,7 @@ Moments moments_of(const Simulation<Dim>& simulation, const Piece<Dim>& piece) {
     const double volume0 = points.column(C::volume)[p], mass = density * volume0, volume = volume0 * determinant(F);
     const Vec3 spin = r.cross(v);
     double* m = sums.m.data();
-    m[0] += mass, m[26] += 1;
+    m[0] += mass, m[26] += 1, m[27] += mass * std::pow(volume, 2.0 / Dim) / 12;
     for (int i = 0; i < 3; ++i) m[1 + i] += mass * r[i], m[4 + i] += mass * v[i], m[7 + i] += mass * spin[i];
     for (int i = 0; i < 3; ++i) {
       m[10 + i] += mass * r[i] * r[i];
@@ -102,7 +103,11 @@ BodyState state_of(int body, const std::array<double, Moments::size>& m, const V
   second -= m[0] * offset * offset.transpose();
   Mat3 inertia = second.trace() * Mat3::Identity() - second;
   for (int i = 0; i < 3; ++i) inertia(i, i) += m[23 + i];
-  s.angular_momentum = spin;
+  s.angular_momentum = spin, s.volume = m[22];
+  for (int i = 0; i < 3; ++i) {
+    s.second_moment[i] = (second(i, i) + (i < dimension ? m[27] : 0.0)) / m[0];
+    s.second_moment[3 + i] = second(i == 2 ? 0 : i, i == 0 ? 1 : 2) / m[0];
+  }
   if (dimension == 2)
     s.angular_velocity[2] = inertia(2, 2) > 0 ? spin[2] / inertia(2, 2) : 0.0;
   else

@@ -275,11 +275,14 @@ void write_grains(const Simulation<Dim>& simulation, const std::filesystem::path
   auto& spin = columns.add_doubles("angular_velocity", 3);
   auto& stress = columns.add_doubles("mean_stress", 6);
   auto& contacts = columns.add_ints("contact_count", 1);
+  auto& volume = columns.add_doubles("volume", 1);
+  auto& second_moment = columns.add_doubles("second_moment", 6);
   for (const BodyState& s : states) {
     append(position, s.centre), append(centre, s.centre), append(velocity, s.velocity),
         append(spin, s.angular_velocity);
     body.push_back(s.body), material.push_back(simulation.bodies()[s.body].material), contacts.push_back(s.contacts);
-    mass.push_back(s.mass), points.push_back(s.points);
+    mass.push_back(s.mass), points.push_back(s.points), volume.push_back(s.volume);
+    second_moment.insert(second_moment.end(), s.second_moment.begin(), s.second_moment.end());
     stress.insert(stress.end(), s.mean_stress.begin(), s.mean_stress.end());
   }
   const RowBlocks rows = consecutive_rows(static_cast<std::int64_t>(states.size()), simulation.communicator());

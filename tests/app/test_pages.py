@@ -19,7 +19,7 @@ from harness import PATIENCE, ROOT, Program, fresh_folder
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
          *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page.name != "tutorial.md")]
 SHOWN = re.compile(r"(?:[A-Z_]+=\S+ )*(cairn|mpirun|scripts/\S+|build/\S+|ctest|cmake|git|export)\b.*")
-RUN = {"cairn", "mpirun", "scripts/plot", "scripts/compare-runs"}
+RUN = {"cairn", "mpirun", "scripts/plot", "scripts/measure", "scripts/compare-runs"}
 NOT_RUN = {"scripts/quickstart", "scripts/test", "scripts/build", "scripts/bench", "scripts/validate", "scripts/check",
            "ctest", "cmake", "export", "git"}
 # A case for pages that only say case.toml, and results for those that start from some.

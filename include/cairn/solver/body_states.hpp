@@ -8,14 +8,16 @@ namespace cairn {
 /// One body as a whole. Positions are continuous across periodic boundaries.
 struct BodyState {
   int body = 0;
-  int points = 0;                        // that it has now
-  double mass = 0;                       // [kg]
-  Vec3 centre = Vec3::Zero();            // [m]
-  Vec3 velocity = Vec3::Zero();          // [m/s]
-  Vec3 angular_velocity = Vec3::Zero();  // of the rigid motion with the same angular momentum [rad/s]
-  Vec3 angular_momentum = Vec3::Zero();  // about the centre [kg m2/s]
-  std::array<double, 6> mean_stress{};   // xx yy zz xy yz xz [Pa]
-  int contacts = 0;                      // bodies touched since the contacts were last cleared
+  int points = 0;                         // that it has now
+  double mass = 0;                        // [kg]
+  double volume = 0;                      // of its points [m3]
+  Vec3 centre = Vec3::Zero();             // [m]
+  Vec3 velocity = Vec3::Zero();           // [m/s]
+  Vec3 angular_velocity = Vec3::Zero();   // of the rigid motion with the same angular momentum [rad/s]
+  Vec3 angular_momentum = Vec3::Zero();   // about the centre [kg m2/s]
+  std::array<double, 6> mean_stress{};    // xx yy zz xy yz xz [Pa]
+  std::array<double, 6> second_moment{};  // mean of r r^T over the mass, r from the centre: xx yy zz xy yz xz [m2]
+  int contacts = 0;                       // bodies touched since the contacts were last cleared
 };
 
 /// States of this rank's share of the bodies, which is [count * rank / ranks, count * (rank + 1) / ranks). Collective.

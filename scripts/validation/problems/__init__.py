@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 
 NAMES = ("block", "limits", "disk", "sphere", "backspin", "disks", "bars", "hertz", "cylinder", "collinear", "zigzag",
-         "waves", "rotation", "grains", "column", "rest", "walls")
+         "waves", "rotation", "grains", "column", "rest", "walls", "laboratory")
 
 
 def load(names: list[str]) -> list:
