@@ -136,7 +136,7 @@ class Weights:
             self.shares.append(share)
             self.near.append([index[int(v)] for v in np.unique(part) if v not in (0, label)])
         self.weights = np.ones(len(found))
-        side = {2: 8, 3: 4}[voxels.ndim]  # samples along each side of a cell between the middles of voxels
+        self.side = side = {2: 8, 3: 4}[voxels.ndim]  # samples along each side of a cell between the middles of voxels
         at = (np.indices((side,) * voxels.ndim).reshape(voxels.ndim, -1) + 0.5) / side
         self.linear = np.stack([np.prod([a if c >> k & 1 else 1 - a for k, a in enumerate(at)], axis=0)
                                 for c in range(1 << voxels.ndim)])
@@ -170,7 +170,12 @@ class Weights:
             room = np.multiply.outer(room, width)
         inside = (corners >= 0).all(axis=0)
         mixed = ~inside & (corners >= 0).any(axis=0)
-        filled = (corners[:, mixed].T @ self.linear.astype(np.float32) >= 0).mean(axis=1)
+        corners = corners[:, mixed]
+        # A sample's room is filled as a plane across it fills it, so that flat faces do not move by whole samples.
+        slope = sum(np.abs(np.mean([corners[c | 1 << k] - corners[c] for c in range(len(corners)) if not c >> k & 1], axis=0))
+                    for k in range(excess.ndim))
+        values = (corners.T @ self.linear.astype(np.float32)) * (self.side / np.maximum(slope, 1e-12))[:, None]
+        filled = np.clip(0.5 + values, 0, 1).mean(axis=1)
         return float(room[inside].sum() + (room[mixed] * filled).sum()), float(room[mixed].sum())
 
     def solve(self, within=0.001, rounds=8):
@@ -181,7 +186,7 @@ class Weights:
             for i, count in enumerate(self.counts):
                 volume, surface = self.volume(i)
                 error[i] = volume / count - 1
-                steps[i] = (count - volume) / (0.45 * max(surface, 1.0))
+                steps[i] = (count - volume) / (0.45 * SIGMA * max(surface, 1.0))
             if np.abs(error).max(initial=0) < within:
                 break
             self.weights = np.clip(self.weights * np.exp(np.clip(steps, -1, 1)), 0.02, 50)

@@ -4,7 +4,7 @@
 _cairn() {
   local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=""
   if ((COMP_CWORD == 1)); then
-    mapfile -t COMPREPLY < <(compgen -W "run check info pack init keys plot measure view report export compare-runs convert-grains --help --version" -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W "run check info pack init keys plot measure view report export compare-runs convert-grains convert-labels convert-cells --help --version" -- "$word")
     return
   fi
   case $before in

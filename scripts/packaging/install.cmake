@@ -9,7 +9,7 @@ foreach(level IN LISTS levels)
   endif()
 endforeach()
 install(PROGRAMS scripts/plot scripts/measure scripts/view scripts/report scripts/export scripts/paraview scripts/python
-        scripts/compare-runs scripts/convert-grains scripts/convert-labels DESTINATION libexec/cairn)
+        scripts/compare-runs scripts/convert-grains scripts/convert-labels scripts/convert-cells DESTINATION libexec/cairn)
 install(DIRECTORY scripts/plotting scripts/measuring scripts/converting DESTINATION libexec/cairn
         FILES_MATCHING PATTERN *.py PATTERN viewer*)
 install(DIRECTORY cases DESTINATION share/cairn)

@@ -41,12 +41,29 @@ void smooth(Grid& grid, int direction, const Taps& taps) {
   grid = std::move(result);
 }
 
+/// Of the labels of a block, the one with the largest sum over the corners.
+std::size_t largest(const std::vector<float>& weighted, std::size_t labels, const std::array<std::size_t, 8>& corners,
+                    const std::array<float, 8>& weights, int count) {
+  constexpr std::size_t together = 8;
+  std::size_t winner = 0;
+  float most = -1;
+  for (std::size_t first = 0; first < labels; first += together) {
+    const std::size_t some = std::min(together, labels - first);
+    std::array<float, together> sums{};
+    for (int c = 0; c < count; ++c) {
+      const float* of_node = weighted.data() + corners[c] * labels + first;
+      for (std::size_t l = 0; l < some; ++l) sums[l] += weights[c] * of_node[l];
+    }
+    for (std::size_t l = 0; l < some; ++l)
+      if (sums[l] >= most) most = sums[l], winner = first + l;
+  }
+  return winner;
+}
+
 }  // namespace
 
 std::size_t LabelVolume::Block::bytes() const {
-  std::size_t all = sizeof(Block) + sole.size() * sizeof(std::int32_t);
-  for (const auto& of_label : weighted) all += of_label.size() * sizeof(float);
-  return all;
+  return sizeof(Block) + sole.size() * sizeof(std::int32_t) + (weighted.empty() ? 0 : weighted[0].size()) * sizeof(float);
 }
 
 LabelVolume::LabelVolume(int dimension, const std::array<std::int64_t, 3>& size, const Vec3& corner,
@@ -107,19 +124,20 @@ void LabelVolume::share_out(Block& block, std::vector<std::int32_t> voxels,
   static const Taps taps = gaussian();
   const std::size_t nodes = std::size_t(block.nodes[0]) * block.nodes[1] * block.nodes[2];
   std::vector<std::uint8_t> present(nodes, 0);
+  const std::size_t count = block.labels.size();
   block.sole.assign(nodes, -1);
-  for (std::size_t l = 0; l < block.labels.size(); ++l) {
+  block.weighted.assign(1, std::vector<float>(nodes * count, 0.0F));
+  for (std::size_t l = 0; l < count; ++l) {
     Grid grid{{int(size[0]), int(size[1]), int(size[2])}, {}};
     grid.values.reserve(voxels.size());
     for (const std::int32_t v : voxels) grid.values.push_back(v == block.labels[l] ? 1.0F : 0.0F);
     for (int k = 0; k < 3; ++k) smooth(grid, k, taps);
     const float weight = block.labels[l] < 0 ? 1.0F : static_cast<float>(facts_[block.labels[l]].weight);
     for (std::size_t i = 0; i < nodes; ++i) {
-      float& share = grid.values[i];
+      const float share = grid.values[i];
       if (share > 0) block.sole[i] = present[i]++ == 0 ? static_cast<std::int32_t>(l) : -1;
-      share *= weight;
+      block.weighted[0][i * count + l] = weight * share;
     }
-    block.weighted.push_back(std::move(grid.values));
   }
 }
 
@@ -185,14 +203,7 @@ int LabelVolume::label_at(const Vec3& x) const {
     sole = sole && block.sole[i] >= 0 && block.sole[i] == block.sole[corners[0]];
   }
   if (sole) return block.labels[block.sole[corners[0]]];
-  float most = 0;
-  std::int32_t winner = -1;
-  for (std::size_t l = 0; l < block.labels.size(); ++l) {
-    float sum = 0;
-    for (int c = 0; c < count; ++c) sum += weights[c] * block.weighted[l][corners[c]];
-    if (sum >= most) most = sum, winner = block.labels[l];
-  }
-  return winner;
+  return block.labels[largest(block.weighted[0], block.labels.size(), corners, weights, count)];
 }
 
 }  // namespace cairn

@@ -9,6 +9,7 @@
 #include "case_names.hpp"
 #include "case_sections.hpp"
 #include "shape_copies.hpp"
+#include "shape_files.hpp"
 
 namespace cairn::reading {
 namespace {
@@ -191,14 +192,18 @@ void read_bodies(Table& root, Draft& draft, Errors& errors) {
   for (Table& table : root.tables("bodies")) {
     BodySpec body;
     body.source = table.where().text();
-    body.shape = Ball{0.5 * (domain.lower + domain.upper), 0};
+    std::vector<Shape> shapes = {Ball{0.5 * (domain.lower + domain.upper), 0}};  // for what does not read
     if (!table.has("shape"))
       table.missing("shape", "is missing; give a table such as { type = \"disk\", centre = [0, 0], radius = 1 }");
     if (Table shape = table.table("shape"); shape.present()) {
       if (auto read = read_shape(shape, draft, errors)) {
-        body.shape = std::move(*read);
-        const std::string problem = draft.domain_known ? placement_problem(body.shape, domain) : "";
-        if (!problem.empty()) table.error("shape", problem);
+        const std::size_t before = errors.count();
+        shapes = one_by_one(*read, shape, draft);
+        for (const Shape& one : shapes) {
+          if (errors.count() != before) break;
+          const std::string problem = draft.domain_known ? placement_problem(one, domain) : "";
+          if (!problem.empty()) table.error("shape", problem);
+        }
       }
     }
     body.material = read_material_name(table, draft.result.materials, true);
@@ -207,7 +212,10 @@ void read_bodies(Table& root, Draft& draft, Errors& errors) {
     body.initial_pressure = table.number("initial_pressure", 0.0);
     body.group = table.text("group", "");
     table.finish();
-    draft.result.bodies.push_back(std::move(body));
+    for (Shape& one : shapes) {
+      body.shape = std::move(one);
+      draft.result.bodies.push_back(body);
+    }
   }
   draft.shaped_bodies = draft.result.bodies.size();
 }

@@ -30,6 +30,24 @@ struct LabelsSpec {
   std::uint64_t checksum = 0;
 };
 
+/// A solid of a file of triangles.
+struct SolidPart {
+  std::string name;
+  std::string place;  // where it begins: "line 12" or "facet 400"
+  Triangles triangles;
+};
+/// A closed line of a drawing.
+struct LinePart {
+  std::string name;
+  std::vector<Vec3> points;
+};
+/// What was read from a file.
+template <class T>
+struct FileParts {
+  std::shared_ptr<const T> content;
+  std::uint64_t checksum = 0;
+};
+
 /// A case while it is read.
 struct Draft {
   Case result;
@@ -39,7 +57,9 @@ struct Draft {
   std::vector<GrainsSpec> grains;            // in order
   std::vector<std::string> inserted_tables;  // for each [[insert]] the copy of its table; empty where it has none
   std::vector<LabelsSpec> labels;
-  std::map<std::string, std::shared_ptr<const Solid>> solids;  // that were read, by what they are made of
+  std::map<std::string, FileParts<std::vector<SolidPart>>> surfaces;  // by file
+  std::map<std::string, FileParts<std::vector<LinePart>>> outlines;
+  std::map<std::string, std::shared_ptr<const Solid>> solids;  // that were made of them
 };
 
 void read_domain(Table domain, Domain& result);

@@ -27,9 +27,9 @@ std::vector<std::string_view> cells_of(std::string_view line) {
 }  // namespace
 
 /// An empty line, or another value in the column `line`, begins a new line.
-std::vector<std::vector<Vec3>> read_csv_lines(std::string_view bytes) {
+std::vector<LinePart> read_csv_lines(std::string_view bytes) {
   TextScanner scanner(bytes);
-  std::vector<std::vector<Vec3>> lines;
+  std::vector<LinePart> lines;
   std::size_t x = 0, y = 1, which = std::string_view::npos, width = 0;
   std::string last;
   bool fresh = true;
@@ -53,13 +53,13 @@ std::vector<std::vector<Vec3>> read_csv_lines(std::string_view bytes) {
     }
     if (cells.size() != width) scanner.fail(fmt::format("has {} values; {} are expected", cells.size(), width));
     if (which != std::string_view::npos && cells[which] != last) fresh = true, last = cells[which];
-    if (std::exchange(fresh, false)) lines.emplace_back();
-    lines.back().emplace_back(scanner.number_of(cells[x], "x"), scanner.number_of(cells[y], "y"), 0.0);
+    if (std::exchange(fresh, false)) lines.push_back({last, {}});
+    lines.back().points.emplace_back(scanner.number_of(cells[x], "x"), scanner.number_of(cells[y], "y"), 0.0);
   }
   return lines;
 }
 
-std::vector<std::vector<Vec3>> read_lines(std::string_view bytes) {
+std::vector<LinePart> read_lines(std::string_view bytes) {
   const std::string_view text = without_mark(bytes);
   const std::size_t first = std::min(text.find_first_not_of(" \t\r\n"), text.size());
   const std::string_view head = text.substr(first, 2000);

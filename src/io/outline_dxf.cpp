@@ -152,9 +152,9 @@ class Drawing {
 
 }  // namespace
 
-std::vector<std::vector<Vec3>> read_dxf_lines(std::string_view bytes) {
+std::vector<LinePart> read_dxf_lines(std::string_view bytes) {
   std::vector<Drawn> open = Drawing(bytes).read();
-  std::vector<Line> lines;
+  std::vector<LinePart> lines;
   Bounds all = shapes::nothing();
   for (const Drawn& d : open)
     for (const Vec3& p : d.points) shapes::widen(all, p);
@@ -174,7 +174,7 @@ std::vector<std::vector<Vec3>> read_dxf_lines(std::string_view bytes) {
       open.erase(next);
     }
     if (d.points.size() > 1 && same(d.points.front(), d.points.back())) d.points.pop_back();
-    lines.push_back(std::move(d.points));
+    lines.push_back({fmt::format("line {}", d.at), std::move(d.points)});
   }
   return lines;
 }

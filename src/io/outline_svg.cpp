@@ -262,9 +262,9 @@ std::vector<Line> lines_of(const Tag& tag) {
 
 }  // namespace
 
-std::vector<std::vector<Vec3>> read_svg_lines(std::string_view bytes) {
+std::vector<LinePart> read_svg_lines(std::string_view bytes) {
   const Text place{bytes};
-  std::vector<Line> all;
+  std::vector<LinePart> all;
   std::vector<Map> maps = {Map::Identity()};
   bool drawing = false;
   for (std::size_t at = bytes.find('<'); at != bytes.npos; at = bytes.find('<', at)) {
@@ -288,7 +288,7 @@ std::vector<std::vector<Vec3>> read_svg_lines(std::string_view bytes) {
         const Eigen::Vector2d mapped = map * p.head<2>().eval();
         p = Vec3(mapped.x(), -mapped.y(), 0);
       }
-      all.push_back(std::move(line));
+      all.push_back({std::string(tag.attribute("id")), std::move(line)});
     }
     if (!alone) maps.push_back(map);
   }

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <utility>
 
 #include "cairn/core/error.hpp"
 #include "cairn/io/checksum.hpp"
@@ -11,20 +11,30 @@
 namespace cairn::reading {
 namespace {
 
+constexpr const char* each = "each";
+
 std::string near(const Vec3& x) { return fmt::format("near [{:.6g}, {:.6g}, {:.6g}]", x.x(), x.y(), x.z()); }
 
-/// Reads the file that a shape names and notes its copy; nothing after an error.
-std::optional<std::string> read_file(ShapeFile& file, std::string_view what, Table& table, Draft& draft) {
+/// What `read` makes of the file that a shape names, read once for all shapes; notes its copy. Nothing after an error.
+template <class T>
+std::shared_ptr<const T> contents_of(ShapeFile& file, std::map<std::string, FileParts<T>>& known, T (*read)(std::string_view),
+                                     std::string_view what, Table& table, Draft& draft) {
+  std::string name;
   try {
     const std::filesystem::path path = path_of_file(file.name, table, draft);
-    if (path.empty()) return std::nullopt;
-    std::string bytes = read_bytes(path, what);
-    file.checksum = checksum(std::span<const char>(bytes));
+    if (path.empty()) return nullptr;
+    FileParts<T>& parts = known[path.string()];
+    if (!parts.content) {
+      const std::string bytes = read_bytes(path, what);
+      name = path.string();
+      parts = {std::make_shared<const T>(read(bytes)), checksum(std::span<const char>(bytes))};
+    }
+    file.checksum = parts.checksum;
     file.copy = add_copy(draft.result.tables, path, file.checksum);
-    return bytes;
+    return parts.content;
   } catch (const InputError& error) {
-    table.error("file", error.what());
-    return std::nullopt;
+    table.error("file", name + error.what());
+    return nullptr;
   }
 }
 
@@ -57,31 +67,34 @@ std::string name_of(const SolidPart& part, std::size_t number) {
                            : fmt::format("solid {} ({})", in_quotes(part.name), part.place);
 }
 
-/// Those that the shape asks for.
-std::vector<std::size_t> chosen(const std::vector<SolidPart>& parts, const Mesh& mesh, Table& table) {
-  std::vector<std::size_t> all, named;
-  std::string names;
-  std::size_t number = parts.size();
-  std::from_chars(mesh.solid.data(), mesh.solid.data() + mesh.solid.size(), number);
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    all.push_back(i);
-    if (parts[i].name == mesh.solid) named.push_back(i);
-    if (i < 10) names += fmt::format("{}{} {}", i ? ", " : "", i, in_quotes(parts[i].name));
+/// Those of `names` that are asked for: all, the ones of this name, or "#N", the one with this number.
+std::vector<std::size_t> chosen(const std::vector<std::string>& names, const std::string& wanted, std::string_view key,
+                                Table& table) {
+  std::vector<std::size_t> found;
+  std::string list;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (wanted.empty() || names[i] == wanted || wanted == fmt::format("#{}", i)) found.push_back(i);
+    if (i < 10) list += fmt::format("{}#{} {}", i ? ", " : "", i, in_quotes(names[i]));
   }
-  if (mesh.solid.empty()) return all;
-  if (named.empty() && number < parts.size()) return {number};
-  if (named.empty())
-    table.error("solid", fmt::format("{} is no solid of the file; it holds {}", in_quotes(mesh.solid), names));
-  return named;
+  if (found.empty() && !wanted.empty())
+    table.error(key, fmt::format("{} is not in the file; it holds {}{}", in_quotes(wanted), list,
+                                 names.size() > 10 ? ", ..." : ""));
+  return found;
 }
 
-std::shared_ptr<const Solid> make_solid(std::string_view bytes, const Mesh& mesh, Table& table, Draft& draft) {
-  std::vector<SolidPart> parts = read_solids(bytes);
+std::vector<std::string> names_of(const auto& parts) {
+  std::vector<std::string> names;
+  for (const auto& part : parts) names.push_back(part.name);
+  return names;
+}
+
+std::shared_ptr<const Solid> make_solid(const std::vector<SolidPart>& parts, const Mesh& mesh, Table& table,
+                                        Draft& draft) {
   const std::size_t before = table.error_count();
   Triangles all;
   bool closed = true;
-  for (const std::size_t i : chosen(parts, mesh, table)) {
-    Triangles& part = parts[i].triangles;
+  for (const std::size_t i : chosen(names_of(parts), mesh.solid, "solid", table)) {
+    Triangles part = parts[i].triangles;
     if (part.corners.empty()) {
       table.error("file", fmt::format("{} holds no triangles", name_of(parts[i], i)));
       continue;
@@ -96,7 +109,6 @@ std::shared_ptr<const Solid> make_solid(std::string_view bytes, const Mesh& mesh
     const auto first = static_cast<std::int32_t>(all.points.size());
     all.points.insert(all.points.end(), part.points.begin(), part.points.end());
     for (const auto& c : part.corners) all.corners.push_back({first + c[0], first + c[1], first + c[2]});
-    part = {};
   }
   if (table.error_count() != before) return nullptr;
   if (all.corners.empty()) {
@@ -114,16 +126,15 @@ std::shared_ptr<const Solid> make_solid(std::string_view bytes, const Mesh& mesh
 }  // namespace
 
 void load(Mesh& mesh, Table& table, Draft& draft) {
-  const auto bytes = read_file(mesh.file, "a surface (STL, OBJ or PLY)", table, draft);
-  if (!bytes) return;
-  const std::string key = fmt::format("{:x} {} {} {}", mesh.file.checksum, mesh.holes > 0, mesh.placement.factor(), mesh.solid);
-  try {
-    auto& known = draft.solids[key];
-    if (!known) known = make_solid(*bytes, mesh, table, draft);
-    mesh.inside = known;
-  } catch (const InputError& error) {
-    table.error("file", mesh.file.name + error.what());
+  const auto parts = contents_of(mesh.file, draft.surfaces, read_solids, "a surface (STL, OBJ or PLY)", table, draft);
+  if (!parts) return;
+  if (mesh.solid == each) {
+    mesh.count = parts->size();
+    return;
   }
+  auto& known = draft.solids[fmt::format("{:x} {} {} {}", mesh.file.checksum, mesh.holes, mesh.placement.factor(), mesh.solid)];
+  if (!known) known = make_solid(*parts, mesh, table, draft);
+  mesh.inside = known;
   if (!mesh.inside) return;
   mesh.place = Place(mesh.placement);
   mesh.box = shapes::nothing();
@@ -131,24 +142,52 @@ void load(Mesh& mesh, Table& table, Draft& draft) {
 }
 
 void load(Outline& outline, Table& table, Draft& draft) {
-  const auto bytes = read_file(outline.file, "an outline (CSV, SVG or DXF)", table, draft);
-  if (!bytes) return;
-  try {
-    const auto lines = read_lines(*bytes);
-    auto loops = std::make_shared<Loops>(lines);
-    if (loops->edges().empty()) return table.error("file", "holds no closed line");
-    if (const auto crossing = crossing_edges(loops->edges()))
-      return table.error("file", fmt::format("the edges that begin {} and {} cross or touch each other",
-                                             near(loops->edges()[crossing->first].from),
-                                             near(loops->edges()[crossing->second].from)));
-    if (!(loops->area() > 0)) return table.error("file", "its lines enclose no area");
-    outline.loops = std::move(loops);
-  } catch (const InputError& error) {
-    return table.error("file", outline.file.name + error.what());
+  const std::size_t before = table.error_count();
+  const auto parts = contents_of(outline.file, draft.outlines, read_lines, "an outline (CSV, SVG or DXF)", table, draft);
+  if (!parts) return;
+  if (outline.line == each) {
+    outline.count = parts->size();
+    return;
   }
+  std::vector<std::vector<Vec3>> lines;
+  for (const std::size_t i : chosen(names_of(*parts), outline.line, "line", table)) lines.push_back((*parts)[i].points);
+  if (table.error_count() != before) return;
+  auto loops = std::make_shared<Loops>(lines);
+  if (loops->edges().empty()) return table.error("file", outline.file.name + " holds no closed line");
+  if (const auto crossing = crossing_edges(loops->edges()))
+    return table.error("file", fmt::format("{}: the edges that begin {} and {} cross or touch each other", outline.file.name,
+                                           near(loops->edges()[crossing->first].from),
+                                           near(loops->edges()[crossing->second].from)));
+  if (!(loops->area() > 0)) return table.error("file", outline.file.name + ": its lines enclose no area");
+  outline.loops = std::move(loops);
   outline.place = Place(outline.placement);
   outline.box = shapes::nothing();
   for (const auto& edge : outline.loops->edges()) shapes::widen(outline.box, outline.place.in_space(edge.from));
+}
+
+bool is_several(const Shape& shape) {
+  const auto* mesh = std::get_if<Mesh>(&shape);
+  const auto* outline = std::get_if<Outline>(&shape);
+  return (mesh && mesh->solid == each) || (outline && outline->line == each);
+}
+
+std::vector<Shape> one_by_one(const Shape& shape, Table& table, Draft& draft) {
+  std::vector<Shape> shapes;
+  const auto expand = [&](auto one, auto which) {
+    const std::size_t count = std::exchange(one.count, 0);
+    for (std::size_t i = 0; i < count; ++i) {
+      one.*which = fmt::format("#{}", i);
+      load(one, table, draft);
+      shapes.emplace_back(one);
+    }
+  };
+  if (!is_several(shape))
+    shapes.push_back(shape);
+  else if (const auto* mesh = std::get_if<Mesh>(&shape))
+    expand(*mesh, &Mesh::solid);
+  else
+    expand(std::get<Outline>(shape), &Outline::line);
+  return shapes;
 }
 
 }  // namespace cairn::reading

@@ -30,7 +30,7 @@ class FacetReader {
       if (word.empty()) break;
       if (word == "solid") {
         parts.push_back({std::string(scanner_.rest_of_line()), fmt::format("line {}", scanner_.line()), {}});
-        scanner_.next_line();
+        scanner_.skip_line();
         read_facets(parts.back());
       } else {
         scanner_.fail(fmt::format("{} where a solid was expected", in_quotes(word)));
@@ -61,7 +61,7 @@ class FacetReader {
     while (true) {
       const std::string word = next();
       if (word == "endsolid") {
-        scanner_.next_line();
+        scanner_.skip_line();
         return;
       }
       if (word != "facet") scanner_.fail(fmt::format("{} where 'facet' or 'endsolid' was expected", in_quotes(word)));

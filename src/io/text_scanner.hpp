@@ -27,6 +27,7 @@ class TextScanner {
     ++number_;
     return true;
   }
+  void skip_line() { line_ = {}; }
   /// The next word of the line; empty at its end.
   std::string_view word() {
     const std::size_t first = std::min(line_.find_first_not_of(" \t\v\f"), line_.size());

@@ -206,7 +206,8 @@ def test_check_refuses(cairn: Program, here: Path):
 
 def test_scripts(cairn: Program, here: Path):
     """The scripts as commands of the program; their exit codes are passed on."""
-    for name, code in (("plot", 2), ("measure", 2), ("compare-runs", 1), ("convert-grains", 2)):
+    for name, code in (("plot", 2), ("measure", 2), ("compare-runs", 1), ("convert-grains", 2),
+                       ("convert-labels", 2), ("convert-cells", 2)):
         expect_code(cairn(name, "--help", cwd=here), 0, "usage")
         arguments = ["nothing"] * (2 if name == "compare-runs" else 1)
         expect_code(cairn(name, *arguments, cwd=here), code, "nothing")

@@ -64,11 +64,11 @@ def test_several_solids_one_open(cairn, here):
             + make.ascii_stl("bucket", *make.box((10, 10, 10), (40, 0, 0), lid=False), end="\r\n"))
     (here / "two.stl").write_bytes(text.encode())
     done = check(cairn, here, mesh("two.stl", 'unit = "mm", scale = 20'))
-    expect_code(done, 2, "'bucket' (line 87)", "4 open edges", "near [", "holes =")
+    expect_code(done, 2, '"bucket" (line 87)', "4 open edges", "near [", "holes =")
     found, _, thin = volume(check(cairn, here, mesh("two.stl", 'unit = "mm", scale = 20, solid = "part one"')))
     expect(abs(found - 6000e-9 * 8000) < 1e-6 and abs(thin - 0.2 / 0.125) < 0.01, f"{found} {thin}")
-    expect(abs(volume(check(cairn, here, mesh("two.stl", 'unit = "mm", scale = 20, solid = "0"')))[0] - 0.048) < 1e-6, "by number")
-    expect_code(check(cairn, here, mesh("two.stl", 'unit = "mm", solid = "lid"')), 2, "'lid' is no solid", "'bucket'")
+    expect(abs(volume(check(cairn, here, mesh("two.stl", 'unit = "mm", scale = 20, solid = "#0"')))[0] - 0.048) < 1e-6, "by number")
+    expect_code(check(cairn, here, mesh("two.stl", 'unit = "mm", solid = "lid"')), 2, '"lid" is not in the file', '#1 "bucket"')
     done = check(cairn, here, mesh("two.stl", 'unit = "mm", scale = 20, solid = "bucket", holes = 0.3'))
     expect("open edges, whose holes are closed" in done.err, done.err)
     expect(abs(volume(done)[0] - 1000e-9 * 8000) < 2e-3, "the bucket")
@@ -94,12 +94,12 @@ def test_what_is_mended_is_said(cairn, here):
 def test_broken_surfaces(cairn, here):
     points, triangles = make.box()
     whole, text = make.binary_stl(points, triangles), make.ascii_stl("a", points, triangles)
-    bad = {"cut.stl": (whole[:-7], "cut off"), "cut_text.stl": (text[:len(text) // 2].encode(), ":43: "),
-           "word.stl": (text.replace("outer loop", "outer lop", 1).encode(), ":3: 'lop' where 'loop'"),
+    bad = {"cut.stl": (whole[:-7], "cut off"), "cut_text.stl": (text[:len(text) // 2].encode(), ":44: "),
+           "word.stl": (text.replace("outer loop", "outer lop", 1).encode(), ':3: "lop" where'),
            "number.stl": (text.replace("vertex 1", "vertex 1,", 1).encode(), "is not a finite number"),
            "nan.stl": (whole[:84 + 50 + 12] + b"\0\0\xc0\x7f" + whole[84 + 50 + 16:], "facet 1 (byte 134)"),
            "face.obj": (make.obj(points, triangles).replace("f 1//1", "f 99//1", 1).encode(), "names vertex 99"),
-           "word.obj": (b"v 0 0 0\nthe end\n", ":2: 'the' is no word"), "empty.stl": (b"", "holds no solid"),
+           "word.obj": (b"v 0 0 0\nthe end\n", ':2: "the" is no word'), "empty.stl": (b"", "holds no solid"),
            "cut.ply": (make.ply(points, triangles, "binary_little_endian")[:-3], "face 11: the file ends"),
            "index.ply": (make.ply(points, triangles, "ascii").replace(b"3 0 2 3", b"3 0 2 8"), "names vertex 8"),
            "head.ply": (b"ply\nformat ascii 1.0\nelement vertex 3\n", "does not end"), "flat.stl": (make.binary_stl(points, [(0, 0, 1)]), "an area")}
@@ -119,10 +119,108 @@ def test_outlines(cairn, here):
         expect(abs(thin - 5 / 1.875) < 0.3, f"{name}: {thin}")
     bad = {"open.svg": (make.SVG.replace(" z", ""), ":4: a path is not closed"), "open.dxf": (make.DXF.replace("21\n0\n0\nLWP", "21\n1\n0\nLWP"), "close it"),
            "spline.dxf": (make.DXF.replace("CIRCLE", "SPLINE"), "SPLINE is not read"), "cross.csv": ("0,0\n2,2\n2,0\n0,2\n", "cross or touch"),
-           "number.csv": ("x,y\n0,0\n1,q\n1,1\n", ":3: y: 'q'"), "cut.svg": (make.SVG[:150], "cut off")}
+           "number.csv": ("x,y\n0,0\n1,q\n1,1\n", ':3: y: "q"'), "cut.svg": (make.SVG[:150], "cut off")}
     for name, (content, words) in bad.items():
         (here / name).write_text(content)
         expect_code(check(cairn, here, f'type = "outline", file = "{name}", unit = "m"', HEAD_2D), 2, name, words)
+
+
+TESS = """***tess
+ **format
+   3.5
+ **general
+   2 standard
+ **cell
+  2
+  *id
+   4 9
+ **vertex
+ 6
+   1 0 0 0 0
+   2 10 -0.000000 0 0
+   3 20 0 0 0
+   4 20 12 0 0
+   5 10 12 0 0
+   6 0 12 0 0
+ **edge
+ 0
+ **face
+ 2
+   1 4 1 2 5 6
+     4 1 2 3 4
+     0 0 0 1
+     0 -1 0 0 0
+   2 4 2 3 4 5
+     4 5 6 7 -2
+     0 0 0 1
+     0 -1 0 0 0
+***end
+"""
+MSH = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+3 1 "low grain"
+3 2 "high"
+$EndPhysicalNames
+$Nodes
+5
+1 0 0 0
+2 1 0 0
+3 0 1 0
+4 0 0 1
+5 1 1 1
+$EndNodes
+$Elements
+3
+1 2 2 7 7 1 2 3
+2 4 2 1 1 1 2 3 4
+3 4 2 2 2 2 3 4 5
+$EndElements
+"""
+
+
+def cells(*arguments):
+    command = [sys.executable, ROOT / "scripts" / "convert-cells", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120 * PATIENCE, check=False)
+
+
+def volumes(done):
+    expect(done.code == 0, f"{done.code} {done.err}")
+    return [float(v) for v in re.findall(r"volume ([-+.0-9e]+) m[23]", done.out)]
+
+
+def test_cells(cairn, here):
+    (here / "grains.tess").write_text(TESS)
+    (here / "parts.msh").write_text(MSH)
+    for source, out, shape, head, right in (
+            ("grains.tess", "grains.csv", 'type = "outline", line = "each"', HEAD_2D, [120, 120]),
+            ("parts.msh", "parts.obj", 'type = "mesh", solid = "each"', HEAD_3D, [1 / 6, 1 / 3])):
+        done = cells(here / source, "-o", here / out)
+        expect(done.returncode == 0 and "2 cells" in done.stdout, f"{source}: {done.stderr}")
+        found = volumes(check(cairn, here, f'{shape}, file = "{out}", unit = "m"', head))
+        expect(np.allclose(found, right, rtol=1e-5), f"{source}: {found}")
+    one = check(cairn, here, 'type = "mesh", solid = "low grain", file = "parts.obj", unit = "m"')
+    expect(np.allclose(volumes(one), 1 / 6, rtol=1e-5), one.out)
+    expect_code(check(cairn, here, 'type = "union", of = [{ type = "mesh", solid = "each", file = "parts.obj", unit = "m" }]'), 2,
+                "stands for each")
+    bad = {"cut.tess": (TESS[:300], "cut off"), "vertex.tess": (TESS.replace("4 1 2 5 6", "4 1 2 5 8"), "names a vertex"),
+           "cut.msh": (MSH[:200], "cut off"), "node.msh": (MSH.replace("2 3 4 5\n$End", "2 3 4 6\n$End"), "names node 6"), "text.tess": ("hello", "neither")}
+    for name, (text, words) in bad.items():
+        (here / name).write_text(text)
+        done = cells(here / name, "-o", here / "new.obj")
+        expect(done.returncode == 2 and words in done.stderr and not (here / "new.obj").exists(), f"{name}: {done.stderr}")
+    if not has_scipy():
+        return print("Voronoi cells: skipped, scipy is not there")
+    for size, out, shape, head, scale in (("1,1", "v.csv", 'type = "outline", line = "each"', HEAD_2D, 20),
+                                          ("1,1,1", "v.obj", 'type = "mesh", solid = "each"', HEAD_3D, 1)):
+        filled = []
+        for options in ([], ["--gap", "0.02"], ["--gap", "0.02", "--round", "0.02"]):
+            done = cells("--voronoi", 8, "--size", size, "-o", here / out, *options)
+            expect(done.returncode == 0, done.stderr)
+            filled.append(sum(volumes(check(cairn, here, f'{shape}, file = "{out}", scale = {scale}', head))) / scale ** (2 if scale > 1 else 3))
+        expect(abs(filled[0] - 1) < 1e-5 and 0.7 < filled[1] < 0.99 and filled[1] * 0.9 < filled[2] < filled[1], f"{size}: {filled}")
 
 
 def has_scipy():
@@ -253,7 +351,7 @@ def test_wrong_labels(cairn, here):
     (here / "scan.nii.gz").write_bytes(make.nifti(make.labels()))
     convert(here / "scan.nii.gz", "-o", here / "grains.h5")
     whole = (here / "grains.h5").read_bytes()
-    tables = {"label,material\n3,soft\n": ("label 9 has no material", "label 700"), "label,material\n3,wood\n": ("table.csv:2: material: 'wood'",),
+    tables = {"label,material\n3,soft\n": ("label 9 has no material", "label 700"), "label,material\n3,wood\n": ('table.csv:2: material: "wood"',),
               "label;material\n": ("the header must be",), "label,material\n3,soft\n3,soft\n9,soft\n700,soft\n44,soft\n": ("there twice", "no label 44")}
     for text, words in tables.items():
         (here / "table.csv").write_text(text)

@@ -12,11 +12,12 @@ struct Mesh {
 
   ShapeFile file;
   Placement placement;
-  std::string solid;  // its name, or its number from 0; empty: all that the file holds
+  std::string solid;  // its name, or "#N" by its number from 0; empty: all that the file holds
   double holes = 0;   // the largest that is closed [m]
   std::shared_ptr<const Solid> inside{};  // in the file's lengths
   Place place{};
   Bounds box{};
+  std::size_t count = 0;  // of solids, while it stands for each of them
 
   template <class Self, class Keys>
   static void list(Self& s, Keys&& keys) {

@@ -12,14 +12,17 @@ struct Outline {
 
   ShapeFile file;
   Placement placement;
+  std::string line;  // its name, or "#N" by its number from 0; empty: all that the file holds
   std::shared_ptr<const Loops> loops{};  // in the file's lengths
   Place place{};
   Bounds box{};
+  std::size_t count = 0;  // of lines, while it stands for each of them
 
   template <class Self, class Keys>
   static void list(Self& s, Keys&& keys) {
     keys.file("file", s.file);
     keys.placement(s.placement);
+    keys.text("line", s.line);
   }
   bool holds(const Vec3& x) const { return loops->holds(place.in_file(x)); }
   Bounds extent() const { return box; }
