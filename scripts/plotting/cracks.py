@@ -21,7 +21,9 @@ def faces(run: Run, frame: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
         crack, index, image = file["crack"][()], file["index"][()], file["image"][()]
         lower, upper = file["lower"][()][:, :2], file["upper"][()][:, :2]
     lines = []
+        parted = file["parted"][()]
     order = np.lexsort((index, image[:, 1], image[:, 0], crack))
+    order = order[parted[order] == 0]
     key = np.column_stack([crack, image[:, :2]])[order]
     starts = np.flatnonzero(np.any(key[1:] != key[:-1], axis=1)) + 1
     for part in np.split(order, starts):
@@ -65,7 +67,8 @@ def tips(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
     if rows.size == 0:
         raise MissingData("tips.csv has no rows")
     table = dict(zip(names, rows.T))
-    panels = (("J", "J [J/m²]"), ("K_I", "K_I [Pa m$^{1/2}$]"), ("K_II", "K_II [Pa m$^{1/2}$]"), ("grown", "growth [m]"))
+    panels = (("J", "J [J/m²]"), ("K_I", "K_I [Pa m$^{1/2}$]"), ("K_II", "K_II [Pa m$^{1/2}$]"),
+              ("grown", "growth [m]"))
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True)
     tips_of_run = sorted(set(zip(table["crack"], table["end"])))
     for panel, (name, title) in zip(axes.flat, panels):

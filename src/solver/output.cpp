@@ -216,6 +216,7 @@ void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path
   auto& index = columns.add_ints("index", 1);
   auto& image = columns.add_ints("image", 3);
   auto& bond = columns.add_ints("bond", 1);
+  auto& parted = columns.add_ints("parted", 1);
   auto& traction = columns.add_doubles("traction", 3);
   auto& length = columns.add_doubles("length", 1);
   auto& stored = columns.add_doubles("stored", 1);
@@ -233,6 +234,7 @@ void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path
       crack.push_back(p.crack), index.push_back(p.index);
       for (int d = 0; d < 3; ++d) image.push_back(d < Dim ? p.image[d] : 0);
       const auto energies = simulation.energies_of(p);
+      parted.push_back(simulation.cracks()[p.crack].idle);
       bond.push_back(p.bond.state), length.push_back(p.bond.length), append(traction, padded(p.traction));
       stored.push_back(energies[0]), dissipated.push_back(energies[1]);
     }

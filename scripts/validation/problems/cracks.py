@@ -68,8 +68,8 @@ def checks(folders: Folders) -> list[Check]:
         grown = b["length"] > b["length"][0] + 4e-3
         expected = (3 * MODULUS * ARM**3 * b["opening"] ** 2 / (16 * TOUGHNESS)) ** 0.25
         book = history(folders["growing beam"])
-        found += [near("growing beam", "(a + .67 d) / (3 E' d^3 w^2/(16 J_c))^(1/4)", ratio(b["length"], expected, grown),
-                       1, 0.06),
+        found += [near("growing beam", "(a + .67 d) / (3 E' d^3 w^2/(16 J_c))^(1/4)",
+                       ratio(b["length"], expected, grown), 1, 0.06),
                   below("growing beam", "largest error of the energy book", np.abs(book["energy_error"]).max(), 0.01)]
     if "plate" in folders:
         tips = read_table(folders["plate"] / "tips.csv")
