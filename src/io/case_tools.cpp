@@ -64,6 +64,7 @@ struct Place {
   double impedance;   // likewise, density x wave speed [kg/(m2 s)]
   double cell;        // the shortest side of one [m]
   Vec3 size;          // of the domain [m]
+  double end;         // of the run [s]
 };
 
 /// The force, or the pressure and its area.
@@ -94,9 +95,11 @@ void check_update(Table& table, StressUpdate update) {
                 "too late");
 }
 
-/// Its defaults absorb the waves of the stiffest material that come along the whole cross-section of the domain.
+/// By default it gives way so easily that a material as hard as the hardest that comes as fast as the force could drive
+/// it changes the force by 1/30, and is never faster than where striking that material would press as hard as the
+/// force.
 void read_servo(Table& table, const Place& place, Piston& piston) {
-  constexpr double layers = 4, fast = 0.1;  // cells of material as heavy as it, share of the wave speed
+  constexpr double layers = 2, easy = 30;  // cells of material as heavy as it
   int k = 0;
   piston.along.cwiseAbs().maxCoeff(&k);
   double area = piston.area;
@@ -106,9 +109,10 @@ void read_servo(Table& table, const Place& place, Piston& piston) {
       if (d != k) area *= place.size[d];
   }
   const double impedance = place.impedance * area;
-  piston.gain = table.number("gain", 1 / impedance, positive);
+  piston.gain = table.number("gain", easy / impedance, positive);
   piston.damping = 1 / piston.gain;
-  piston.largest = table.number("largest", fast * place.wave_speed, positive);
+  const double force = piston.force.largest(place.end) * (piston.pressure ? area : 1);
+  piston.largest = table.number("largest", force > 0 ? force / impedance : 0.1 * place.wave_speed, positive);
   piston.mass = layers * place.cell / place.wave_speed * impedance;
 }
 
@@ -131,7 +135,8 @@ void read_piston(Table& parent, const Place& place, StressUpdate update, Piston&
 
 Place place_in(const Case& c, int face) {
   Place place{
-      c.domain.dimension, face >= 0, Vec3::Zero(), 1, 1, smallest_cell(c.domain), c.domain.upper - c.domain.lower};
+      c.domain.dimension, face >= 0, Vec3::Zero(), 1, 1, smallest_cell(c.domain), c.domain.upper - c.domain.lower,
+      c.time.end};
   if (face >= 0) place.inwards[face / 2] = face % 2 ? -1 : 1;
   double fastest = 0, hardest = 0;
   for (const Material& m : c.materials) {

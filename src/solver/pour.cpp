@@ -133,8 +133,6 @@ void Simulation<Dim>::place_body(int number, const Shape& shape) {
         });
   }
   total_points_ += std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
-  const SolverMaterial& material = materials_[bodies_[number].material];
-  maxima_[0] = std::max(maxima_[0], std::sqrt(material.longitudinal_modulus / material.density));
   const Bounds box = bounds(shape);
   const BodySpec& spec = one.bodies[0];
   maxima_[1] =
@@ -143,6 +141,16 @@ void Simulation<Dim>::place_body(int number, const Shape& shape) {
 
 template <int Dim>
 void Simulation<Dim>::insert_bodies() {
+  // Steps are as short as the bodies to come need them, be there others or not.
+  for (std::size_t i = 0; i < poured_.size(); ++i) {
+    const Insert& insert = pouring_.inserts[i];
+    if (poured_[i].placed == insert.count) continue;
+    finish_speed_reduction();
+    for (int b = insert.first + poured_[i].placed; b < insert.first + insert.count; ++b) {
+      const SolverMaterial& material = materials_[bodies_[b].material];
+      maxima_[0] = std::max(maxima_[0], std::sqrt(material.longitudinal_modulus / material.density));
+    }
+  }
   for (std::size_t i = 0; i < poured_.size(); ++i) {
     const Insert& insert = pouring_.inserts[i];
     Pouring& state = poured_[i];

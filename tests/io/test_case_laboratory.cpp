@@ -69,7 +69,8 @@ TEST_F(CaseFile, LaboratoriesReadBackToTheSameCase) {
   EXPECT_DOUBLE_EQ(drive.piston.force.at(1.25).x(), 1.25);
   EXPECT_TRUE(drive.piston.pressure);
   const double modulus = 2e5 + 4e5 / 3, impedance = std::sqrt(1000 * modulus) * 0.4;
-  EXPECT_NEAR(drive.piston.gain, 1 / impedance, 1e-9 / impedance);
+  EXPECT_NEAR(drive.piston.gain, 30 / impedance, 1e-9 / impedance);
+  EXPECT_NEAR(drive.piston.largest, 5 * 0.4 / impedance, 1e-9);
   EXPECT_TRUE(moves(again.faces[0], 0) && moves(again.faces[3], 3) && !moves(again.faces[2], 2));
   EXPECT_EQ(again.faces[3].piston.along, Vec3(0, -1, 0));
   EXPECT_EQ(again.time.until.packing, 0.5);
