@@ -31,7 +31,9 @@ Shape moved(const Shape& shape, const Vec3& way) {
           s.point += way;
         else if constexpr (std::is_same_v<S, Compound>)
           for (Shape& part : s.of) part = moved(part, way);
-        else
+        else if constexpr (requires { s.placement; })
+          s.placement.move += way, s.place = Place(s.placement), s.box.lower += way, s.box.upper += way;
+        else if constexpr (requires { s.centre; })
           s.centre += way;
       },
       result);
