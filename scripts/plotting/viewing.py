@@ -267,8 +267,9 @@ class Page:
             contacts = run.file_at(run.contact_files, frame.time) if run.contact_files else None
             if contacts is not None and contacts.points:
                 sides = np.stack([contacts.field("body_a"), contacts.field("body_b")], 1)
-                parts[f"pairs_{k}"] = np.searchsorted(bodies, sides).astype(np.uint32)
-                parts[f"contacts_{k}"] = np.concatenate([contacts.field("point"), contacts.field("force")], 1).astype(np.float32)
+                both = np.isin(sides, bodies).all(axis=1)
+                parts[f"pairs_{k}"] = np.searchsorted(bodies, sides[both]).astype(np.uint32)
+                parts[f"contacts_{k}"] = np.column_stack([contacts.field("point"), contacts.field("force")])[both].astype(np.float32)
         parts["stress"] = stress
         colour = colours.of_run(run)(bodies)
         parts["colour"] = np.rint(255 * colour).astype(np.uint8)
