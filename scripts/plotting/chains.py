@@ -50,16 +50,17 @@ def network(run: Run, contacts: Frame, frame: Frame) -> Network:
     sides = [contacts.field("body_a"), contacts.field("body_b")]
     point = contacts.field("point").astype(float)
     force = np.linalg.norm(contacts.field("force"), axis=1)
-    if not len(bodies) or not np.isin(np.concatenate(sides), bodies).all():
-        known = np.isin(sides[0], bodies) & np.isin(sides[1], bodies)
-        sides, point, force = [side[known] for side in sides], point[known], force[known]
+    known = [np.isin(side, bodies) for side in sides]
+    touching = known[0] | known[1]
+    sides, known = [side[touching] for side in sides], [k[touching] for k in known]
+    point, force = point[touching], force[touching]
     period = np.zeros(3)
     period[: run.dimension] = (run.upper - run.lower) * run.periodic
     large = mass > LARGE * np.median(mass) if len(mass) else mass > 0
     ends = []
-    for side in sides:
-        at = np.searchsorted(bodies, side)
-        arm = centres[at] - point
+    for side, there in zip(sides, known):
+        at = np.minimum(np.searchsorted(bodies, side), max(len(bodies) - 1, 0))
+        arm = (centres[at] - point) * there[:, None]  # a line to what is no body, such as a wall, ends at the contact
         arm -= period * np.rint(arm / np.where(period > 0, period, 1))
         arm[large[at]] = 0
         ends.append(point + arm)

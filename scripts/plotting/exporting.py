@@ -57,6 +57,12 @@ class Moment:
             columns |= {f"stress_{name}": b.stress[:, k] for k, name in enumerate(STRESS)}
         return columns
 
+    def bonds(self) -> dict[str, np.ndarray]:
+        """Contacts of two bodies that have points."""
+        columns = self.contact_columns()
+        both = np.logical_and(*[np.isin(columns[name], self.bodies.body) for name in ("body_a", "body_b")]) if columns else []
+        return {name: column[both] for name, column in columns.items()}
+
     def contact_columns(self) -> dict[str, np.ndarray]:
         table = self.contacts
         if table is None:
@@ -108,7 +114,7 @@ def lammps(moments: list[Moment], folder: Path) -> list[str]:
 def _bonds(moments: list[Moment], folder: Path) -> str:
     with whole_file(folder / "contacts.dump") as draft, open(draft, "w", encoding="ascii") as file:
         for moment in moments:
-            columns = moment.contact_columns()
+            columns = moment.bonds()
             count = len(columns["body_a"]) if columns else 0
             sides = " ".join("pp" if periodic else "ff" for periodic in moment.periodic())
             box = "\n".join(f"{low:.12g} {high:.12g}" for low, high in moment.box())
@@ -127,7 +133,7 @@ def _bond_columns(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def _data(moment: Moment, folder: Path) -> str:
     """A LAMMPS data file, atom style bond: grains as atoms, contacts as bonds."""
-    bodies, contacts = moment.bodies, moment.contact_columns()
+    bodies, contacts = moment.bodies, moment.bonds()
     bonds = len(contacts["body_a"]) if contacts else 0
     box = "\n".join(f"{low:.12g} {high:.12g} {name}lo {name}hi" for (low, high), name in zip(moment.box(), CARTESIAN))
     with whole_file(folder / "grains.data") as draft, open(draft, "w", encoding="ascii") as file:

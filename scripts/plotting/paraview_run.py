@@ -9,13 +9,13 @@ import sys
 from pathlib import Path
 
 from paraview.simple import (  # what ParaView 5.11 and later have
-    Calculator, ColorBy, GetActiveViewOrCreate, GetAnimationScene, GetColorTransferFunction, Glyph, OpenDataFile, PVDReader,
-    Render, ResetCamera, SaveScreenshot, SaveState, Show, TableToPoints, CSVReader, Threshold, UpdateScalarBars)
+    Calculator, ColorBy, CreateView, GetActiveView, GetAnimationScene, GetColorTransferFunction, Glyph, OpenDataFile, PVDReader,
+    ResetCamera, SaveScreenshot, SaveState, Show, TableToPoints, CSVReader, Threshold)
 
 
 def load(run: Path, value: str) -> dict:
     """The pipeline's ends by name: points, grains, contacts (where there are any)."""
-    view = GetActiveViewOrCreate("RenderView")
+    view = GetActiveView() or CreateView("RenderView")
     made = {}
     index = run / "particles.hdf.series"
     if not index.is_file():
@@ -38,9 +38,8 @@ def load(run: Path, value: str) -> dict:
 
 def show(view, made: dict, value: str) -> dict:
     """Points in colours of a value, grains as faint spheres, contacts as lines as thick as they are strong."""
-    scene = GetAnimationScene()
-    scene.UpdateAnimationUsingDataTimeSteps()
-    scene.GoToLast()
+    GetAnimationScene().UpdateAnimationUsingDataTimeSteps()
+    view.ViewTime = made["points"].TimestepValues[-1]
     points = Show(made["points"], view)
     points.SetRepresentationType("Points")
     points.PointSize = 4
@@ -59,9 +58,6 @@ def show(view, made: dict, value: str) -> dict:
         lines = Show(made["contacts"], view)
         lines.LineWidth = 3
         ColorBy(lines, ("CELLS", "force"))
-    UpdateScalarBars(view)
-    ResetCamera(view)
-    Render(view)
     return made
 
 
@@ -74,6 +70,8 @@ def main() -> None:
     inside = os.environ.get("CAIRN_RUN")
     options = parser.parse_args([inside] if inside else None)
     made = load(options.run.resolve(), options.value)
+    if options.picture or inside:
+        ResetCamera()
     if options.picture:
         SaveScreenshot(options.picture, ImageResolution=[1200, 900], OverrideColorPalette="WhiteBackground")
     if options.state:

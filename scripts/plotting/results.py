@@ -95,7 +95,7 @@ class Frame:
             expected = (self.points, COMPONENTS[name]) if name in COMPONENTS else (self.points,)
             if values.shape != expected or values.dtype.kind not in "iuf":
                 raise ValueError(f"'{name}' is {values.dtype} of shape {values.shape}, not numbers of shape {expected}")
-            if not np.isfinite(values).all() or (name in ("body", "body_a", "body_b") and values.size and values.min() < 0):
+            if not np.isfinite(values).all() or (name == "body" and values.size and values.min() < 0):
                 raise ValueError(f"'{name}' holds values that no run writes")
             return values
 

@@ -220,7 +220,7 @@ function fill() {
   $("frame").max = head.frames.length - 1;
   const columns = Object.keys(head.history).filter((name) => name !== "time");
   $("past").hidden = !columns.length;
-  $("column").append(...columns.map((name) => option(name, name.replaceAll("_", " "))));
+  $("column").append(...columns.map((name) => option(name, name.replaceAll("_", " ") + (head.units[name] ? ` [${head.units[name]}]` : ""))));
 }
 
 let last = 0, before = 0, moving = 0;

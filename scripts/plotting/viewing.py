@@ -267,8 +267,9 @@ class Page:
             contacts = run.file_at(run.contact_files, frame.time) if run.contact_files else None
             if contacts is not None and contacts.points:
                 sides = np.stack([contacts.field("body_a"), contacts.field("body_b")], 1)
-                parts[f"pairs_{k}"] = np.searchsorted(bodies, sides).astype(np.uint32)
-                parts[f"contacts_{k}"] = np.concatenate([contacts.field("point"), contacts.field("force")], 1).astype(np.float32)
+                both = np.isin(sides, bodies).all(axis=1)
+                parts[f"pairs_{k}"] = np.searchsorted(bodies, sides[both]).astype(np.uint32)
+                parts[f"contacts_{k}"] = np.column_stack([contacts.field("point"), contacts.field("force")])[both].astype(np.float32)
         parts["stress"] = stress
         colour = colours.of_run(run)(bodies)
         parts["colour"] = np.rint(255 * colour).astype(np.uint8)
@@ -290,6 +291,7 @@ class Page:
                 "periodic": run.periodic.tolist(), "bodies": points.bodies.tolist(), "deep": run.point_spacing / DEEP,
                 "frames": [{"time": f.time, "step": f.step, "label": label(run, f)} for f in self.frames],
                 "full": kept, "scales": self.scales, "index": pack.index, "history": self._history(),
+                "units": {name: history_unit(name, run.dimension) for name in self._history()},
                 "values": [{"name": n, "title": v.title, "unit": v.unit, "low": low, "high": high,
                             "map": "diverging" if low < 0 < high else "sequential"}
                            for n, v, (low, high) in zip(self.names, self.shown, self.ends)],
@@ -301,6 +303,13 @@ class Page:
                               ("%DATA%", base64.b64encode(pack.compressed()).decode("ascii"))):
             page = page.replace(mark, content, 1)
         return page
+
+
+def history_unit(name: str, dimension: int) -> str:
+    """The unit of a column of history.csv; "" for numbers."""
+    kinds = ((("_energy", "_dissipation", "_work", "_gain", "energy_left"), "J"), (("mass", "mass_left"), "kg"))
+    units = [unit for ends, unit in kinds if name.endswith(ends)] or ["kg m/s"] * name.startswith("momentum")
+    return "".join(units[:1]) + (" / m" if units and dimension == 2 else "")
 
 
 def view(options: argparse.Namespace) -> int:

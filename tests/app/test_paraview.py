@@ -6,6 +6,7 @@ Uses pvpython, or the vtkmodules of this Python (which open single files only). 
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -154,7 +155,7 @@ def see_with_vtk(files: list[Path]) -> dict:
     return seen
 
 
-def check_script(pvpython: str, out: Path, scratch: Path, points: int) -> None:
+def check_script(out: Path, scratch: Path, points: int) -> None:
     """scripts/paraview loads points, bodies and contacts, draws them without a display, and saves the pipeline."""
     picture, state = scratch / "paraview.png", scratch / "run.pvsm"
     command = [ROOT / "scripts" / "paraview", out, "--picture", picture, "--state", state]
@@ -206,7 +207,10 @@ def main(cairn: str, scratch: Path):
         assert [s["time"] for s in series] == [e["time"] for e in expected], f"times {[s['time'] for s in series]}"
         for s, e in zip(series, expected):
             compare(f"series at {e['time']} s", s, e)
-        check_script(pvpython, out, scratch, expected[-1]["points"])
+        if shutil.which("xvfb-run") or os.environ.get("DISPLAY"):
+            check_script(out, scratch, expected[-1]["points"])
+        else:
+            print("there is neither a display nor xvfb-run (Debian: xvfb, xauth): scripts/paraview was not run")
     if has_vtk():
         check_lines(out)
     reader = "ParaView" if pvpython else "VTK"

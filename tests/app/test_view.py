@@ -231,6 +231,8 @@ def test_two_dimensions(cairn: Program, scratch: Path) -> None:
     view(scratch / "run")
     head, arrays = unpacked(scratch / "run" / "view.html")
     expect(head["dimension"] == 2 and "pairs_2" in arrays and "kinetic_energy" in head["history"], list(arrays))
+    units = [head["units"][name] for name in ("kinetic_energy", "momentum_x", "mass", "energy_error")]
+    expect(units == ["J / m", "kg m/s / m", "kg / m", ""], units)
     expect(np.isfinite(arrays["stress"]).all(), "stresses of grains are missing")
     chromium = find_chromium()
     if chromium:
