@@ -167,12 +167,13 @@ def profile(found: Fields, axis: int) -> dict[str, np.ndarray]:
     there = np.where(density > 0, density, np.nan)
     heat = np.nan_to_num(found.temperature * found.density).mean(axis=others)
     names = "xyz"[: momentum.shape[-1]]
-    table = {names[axis]: found.grid.middles(axis), "density": density, "packing_fraction": found.fraction.mean(axis=others)}
+    table = {names[axis]: found.grid.middles(axis), "density": density,
+             "packing_fraction": found.fraction.mean(axis=others)}
     table |= {f"velocity_{name}": momentum[:, i] / there for i, name in enumerate(names)}
     table["temperature"] = heat / there
     for kind in ("contact", "kinetic"):
         stress = getattr(found, f"{kind}_stress")
         if stress is not None:
             mean = stress.mean(axis=others)
-            table |= {f"{kind}_stress_{names[i]}{names[j]}": mean[:, i, j] for i in range(len(names)) for j in range(len(names))}
+            table |= {f"{kind}_stress_{a}{b}": mean[:, i, j] for i, a in enumerate(names) for j, b in enumerate(names)}
     return table

@@ -1,4 +1,4 @@
-"""All measures of an output as names and numbers, and as tables; the one place that docs, plots and tests take them from."""
+"""All measures of an output as names and numbers, and as tables: where docs, plots and tests take them from."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def packing(snapshot: Snapshot, options: Options) -> Measures:
 def has_friction(run: Run) -> bool:
     rules = run.case.get("contact", {})
     rows = [rules, *rules.get("pair", [])]
-    return any(row.get("law", "friction") in ("friction", "stick", "none") and row.get("friction", 0.3) > 0 for row in rows)
+    return any(row.get("law", "friction") != "frictionless" and row.get("friction", 0.3) > 0 for row in rows)
 
 
 def coordination(snapshot: Snapshot, options: Options) -> Measures:
@@ -89,7 +89,8 @@ def forces(snapshot: Snapshot, _options: Options) -> Measures:
              "mean_tangential_force": float(np.linalg.norm(contacts.tangential_force, axis=1).mean())}
     share = network.mobilised(contacts, network.frictions(snapshot.run, snapshot))
     if len(share):
-        found |= {"mobilised_friction": float(share.mean()), "sliding_contacts": float((share > network.SLIDING).mean())}
+        found |= {"mobilised_friction": float(share.mean()),
+                  "sliding_contacts": float((share > network.SLIDING).mean())}
     return found
 
 
@@ -207,7 +208,8 @@ def force_table(snapshot: Snapshot, options: Options) -> Table:
     x, p = network.density(normal, 6.0, options.bins)
     share = network.mobilised(contacts, network.frictions(snapshot.run, snapshot))
     y, q = network.density(np.minimum(share, 1.0), 1.0, options.bins)
-    return {"normal_force_over_mean": x, "P_normal": p, "mobilised_friction": y, "P_mobilised": q if len(share) else q * np.nan}
+    return {"normal_force_over_mean": x, "P_normal": p, "mobilised_friction": y,
+            "P_mobilised": q if len(share) else q * np.nan}
 
 
 def field_table(snapshot: Snapshot, options: Options) -> Table:

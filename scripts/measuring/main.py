@@ -1,4 +1,4 @@
-"""Measures a finished run: one output, or a row for each; or a table of grains, contacts, forces, fields, a profile, pairs."""
+"""Measures a finished run: one output, or a row for each; or a table of grains, contacts, forces, fields or pairs."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def arguments() -> argparse.Namespace:
                         help="lower and upper corner of the box [m]; default: between walls and tools")
     parser.add_argument("--threshold", type=float, default=0.0, metavar="SHARE",
                         help="leave out contacts below this share of the mean force; default 0")
-    parser.add_argument("--rattlers", type=int, metavar="N", help="grains with fewer contacts are rattlers; default: the "
-                        "dimension + 1 without friction, 2 with it")
+    parser.add_argument("--rattlers", type=int, metavar="N", help="grains with fewer contacts are rattlers; default: 2 "
+                        "with friction, the dimension + 1 without")
     parser.add_argument("--radius", type=float, metavar="M", help="of the kernel of fields; default: a mean diameter")
     parser.add_argument("--cell", type=float, metavar="M", help="of the grid of fields; default: half the radius")
     parser.add_argument("--across", choices="xyz", default="y", help="axis of profiles; default y")

@@ -26,7 +26,8 @@ def affine(place: np.ndarray, value: np.ndarray, weight: np.ndarray) -> tuple[np
     share = weight / weight.sum()
     mean = share @ value
     arm = place - share @ place
-    gradient = np.linalg.lstsq(np.sqrt(share)[:, None] * arm, np.sqrt(share)[:, None] * (value - mean), rcond=1e-10)[0].T
+    root = np.sqrt(share)[:, None]
+    gradient = np.linalg.lstsq(root * arm, root * (value - mean), rcond=1e-10)[0].T
     return mean, gradient, value - mean - arm @ gradient.T
 
 

@@ -55,7 +55,8 @@ def frictions(run: Run, snapshot: Snapshot) -> np.ndarray:
 
     def coefficient(table: dict, law: str) -> float:
         law = table.get("law", "friction" if "friction" in table else law)
-        return {"frictionless": 0.0, "friction": float(table.get("friction", rules.get("friction", 0.3)))}.get(law, math.inf)
+        value = float(table.get("friction", rules.get("friction", 0.3)))
+        return {"frictionless": 0.0, "friction": value}.get(law, math.inf)
 
     general = coefficient(rules, rules.get("law", "friction"))
     table = np.full((len(names) + 1, len(names) + 1), general)

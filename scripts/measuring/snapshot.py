@@ -116,7 +116,7 @@ class Snapshot:
         if not keep.any():
             raise MissingData(f"{frame.path.name} holds no grain: all bodies are rigid or driven")
         if not (frame.has("volume") and frame.has("second_moment")):
-            raise MissingData(f"{frame.path.name} holds no field 'volume': it is of an older program; run the case again")
+            raise MissingData(f"{frame.path.name} holds no field 'volume', as older programs wrote it; run the case again")
         def column(name):
             return frame.field(name)[keep]
         return Grains(column("body"), column("material"), column("mass"), column("centre")[:, :d],

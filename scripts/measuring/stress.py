@@ -16,7 +16,7 @@ from results import MissingData
 def added(rows: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     """Sums of tensors by row; values: N x d x d."""
     shape = values.shape[1:]
-    flat = values.reshape(len(values), -1)
+    flat = values.reshape(len(values), math.prod(shape))
     return np.stack([np.bincount(rows, column, count) for column in flat.T], axis=1).reshape(count, *shape)
 
 

@@ -1,5 +1,5 @@
-"""What granular laboratories draw: stress over strain, force over displacement, coordination over packing fraction, force
-distributions, fabric roses and profiles. Measures are those of docs/measures.md.
+"""What granular laboratories draw: stress over strain, force over way, coordination over packing fraction, distributions
+of forces, roses of the fabric, profiles, outflow. Measures are those of docs/measures.md.
 
 Functions like those of figures.py.
 """
@@ -20,7 +20,7 @@ from results import MissingData, Run
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # where measuring is
 
-from measuring import coarse, collect, motion, network  # noqa: E402
+from measuring import coarse, collect, network  # noqa: E402
 from measuring.snapshot import Snapshot  # noqa: E402
 
 SECTORS = 36  # of a rose
@@ -107,7 +107,8 @@ def coordination(run: Run, other: Run | None, folder: Path, summary: dict) -> li
     table = needed(run, "coordination", "packing_fraction")
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2))
     left.plot(table["packing_fraction"], table["coordination"], ".-", lw=1, ms=4, label="all")
-    left.plot(table["packing_fraction"], table["coordination_without_rattlers"], ".-", lw=1, ms=4, label="without rattlers")
+    left.plot(table["packing_fraction"], table["coordination_without_rattlers"], ".-", lw=1, ms=4,
+              label="without rattlers")
     left.set_ylabel("coordination Z")
     left.legend(fontsize=8)
     right.plot(table["packing_fraction"], table["pressure"], ".-", lw=1, ms=4, color="C3")
@@ -160,8 +161,9 @@ def fabric_rose(run: Run, other: Run | None, folder: Path, summary: dict) -> lis
     count = np.bincount(sector, minlength=SECTORS)
     push = np.bincount(sector, np.tile(contacts.normal_force, 2), SECTORS) / np.maximum(count, 1)
     tensors = network.fabric(contacts), network.force_fabrics(contacts)[0]
+    carried = push * count / (contacts.normal_force.mean() * count.mean())
     roses = ((count / count.mean(), tensors[0], "contacts, over the mean"),
-             (push * count / (contacts.normal_force.mean() * count.mean()), tensors[1], "normal force they carry, over the mean"))
+             (carried, tensors[1], "normal force they carry, over the mean"))
     figure, pair = plt.subplots(1, 2, figsize=(10, 5), subplot_kw={"projection": "polar"})
     theta, fine = (np.arange(SECTORS) + 0.5) * 2 * np.pi / SECTORS, np.linspace(0, 2 * np.pi, 361)
     for axes, (values, tensor, title) in zip(pair, roses):
@@ -174,7 +176,7 @@ def fabric_rose(run: Run, other: Run | None, folder: Path, summary: dict) -> lis
 
 
 def profiles(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
-    """Packing fraction, velocity, stress and temperature across the layer, in the mean over the last half of the time."""
+    """Packing fraction, velocity, stress and temperature across the layer, means over the last half of the time."""
     shear = run.shear()
     across = shear.axis if shear else int(np.abs(run.gravity).argmax()) if np.abs(run.gravity).any() else 1
     late = [k for k, frame in enumerate(run.grains) if frame.time >= LATE * run.grains[-1].time]
@@ -190,7 +192,8 @@ def profiles(run: Run, other: Run | None, folder: Path, summary: dict) -> list[s
         count = np.isfinite(rows).sum(axis=0)
         mean[name] = np.where(count > 0, np.nansum(rows, axis=0) / np.maximum(count, 1), np.nan)
     axis = "xyz"[across]
-    panels = (("packing fraction", ["packing_fraction"]), ("velocity [m/s]", [n for n in names if n.startswith("velocity")]),
+    panels = (("packing fraction", ["packing_fraction"]),
+              ("velocity [m/s]", [n for n in names if n.startswith("velocity")]),
               ("stress by contacts [Pa]", [n for n in names if n.startswith("contact_stress")]),
               ("granular temperature [m2/s2]", ["temperature"]))
     figure, row = plt.subplots(1, len(panels), figsize=(15, 4.2), sharey=True)

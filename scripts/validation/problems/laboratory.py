@@ -112,7 +112,8 @@ def layer(folder: Path) -> dict[str, float]:
     late = np.flatnonzero(wall["time"] >= start)
     first, last = late[0], late[-1]
     span = wall["time"][last] - wall["time"][first]
-    drag, push = (sign * (wall[f"impulse_{a}"][last] - wall[f"impulse_{a}"][first]) / span for a, sign in (("x", -1), ("y", 1)))
+    given = {axis: (wall[f"impulse_{axis}"][last] - wall[f"impulse_{axis}"][first]) / span for axis in "xy"}
+    drag, push = -given["x"], given["y"]
     fractions, rates = [], []
     for k, frame in enumerate(run.grains):
         if frame.time < start:
@@ -204,5 +205,5 @@ def draw(folders: Folders, out: Path) -> list[Path]:
     return [draw_panels(out / "laboratory.png", "The granular laboratory", panels, columns=2)]
 
 
-PROBLEM = Problem("laboratory", "The granular laboratory", "Lagrangian finite elements; da Cruz et al. 2005; Staron & Hinch 2005",
-                  runs, checks, draw)
+PROBLEM = Problem("laboratory", "The granular laboratory",
+                  "Lagrangian finite elements; da Cruz et al. 2005; Staron & Hinch 2005", runs, checks, draw)
