@@ -1,9 +1,10 @@
-"""What granular laboratories measure: one soft disk pressed flat, a layer sheared at constant pressure, a column that
-collapses.
+"""What granular laboratories measure: one soft disk pressed flat, many of them far beyond jamming, a layer sheared at
+constant pressure, a column that collapses.
 
-The disk is compared with finite elements that move with the material, which is exact to what refining them changes. The
-laws of sheared layers (da Cruz et al. 2005) and of columns (Staron & Hinch 2005) are the literature's, of many more and
-of stiff disks; here they are beside what few soft ones give.
+The one disk is compared with finite elements that move with the material, which is exact to what refining them changes.
+The laws of jammed packs, of sheared layers (da Cruz et al. 2005) and of columns (Staron & Hinch 2005) are the
+literature's, of many more disks, in the last two of stiff ones; they stand beside what few soft ones give here, and are
+no bands.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from measuring import motion
+from measuring import motion, network
 from measuring.snapshot import Grains, Snapshot
+from results import MissingData
 from results import Run as Results
 from validation.checks import Check, near, record
 from validation.figures import Curve, Panel, draw_panels
@@ -32,6 +34,10 @@ ELEMENTS, STEPS = 32, 40
 SPEEDS = (0.2, 0.4, 0.8)
 LENGTH, PRESSURE, DIAMETER, DENSITY = 0.8, 500.0, 0.1, 1000.0
 SETTLED = 0.75  # of the way that is sheared before anything is averaged, in wall-to-wall distances
+# Soft disks without friction: speeds of the lid [m/s]; the literature's factor in Z - Z_0.
+LID_SPEEDS = (0.1, 0.05)
+SOFT, XI, ISOSTATIC = 1.0e5, 5.1, 4.0  # Young's modulus [Pa]
+THRESHOLD = 1e-3  # of the mean force, below which nothing counts as a contact
 # The column of 44 disks.
 COLUMN_WIDTH, OPENED = 0.5, 0.25  # [m], and when the gate goes [s]
 STRAY = 1.2  # a disk farther than so many diameters from the next one has left the heap
@@ -63,9 +69,21 @@ def layer_label(speed: float) -> str:
     return f"layer, {speed} m/s"
 
 
+def soft_label(speed: float) -> str:
+    return f"soft disks, {speed} m/s"
+
+
+def softly(speed: float) -> Run:
+    end = 0.05 + 0.2 / speed
+    return Run("laboratory/soft_disks", {
+        "time.end": end, "drive.0.velocity": [[0.0, 0.0, 0.0], [0.1, 0.0, -speed]], "output.grains.interval": end / 42,
+        "output.contacts.interval": end / 42, "output.particles.interval": end / 42}, 4 / speed)
+
+
 def runs(full: bool) -> dict[str, Run]:
     found = {disk_label(cells, nu): flat(cells, nu) for cells in CELLS[: 1 + full] for nu in RATIOS}
     found |= {layer_label(speed): sheared(speed) for speed in (SPEEDS if full else SPEEDS[1:2])}
+    found |= {soft_label(speed): softly(speed) for speed in LID_SPEEDS[: 1 + full]}
     return found | {"column": Run("laboratory/column_collapse", {"time.end": 1.6, "output.particles": "{}"}, 20)}
 
 
@@ -177,8 +195,66 @@ def column_checks(folders: Folders) -> list[Check]:
                    reach[-1] / COLUMN_WIDTH - 1, literature)]
 
 
+@functools.cache
+def jammed(folder: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Packing fraction, coordination without rattlers, and pressure on the lid over E, at the outputs with points; of
+    the middle, more than 1.5 diameters from the plates."""
+    run, rows = Results(folder), []
+    lid = run.forces()["lid"]
+    for k, frame in enumerate(run.grains):
+        snapshot = Snapshot(run, k, threshold=THRESHOLD)
+        try:
+            points = snapshot.points
+        except MissingData:
+            continue
+        low, high = (end[1] + side * 1.5 * DIAMETER for end, side in zip(snapshot.box, (1, -1)))
+        height = points.field("position")[:, 1]
+        grain = np.isin(points.field("body"), snapshot.grains.body) & (height > low) & (height < high)
+        area = points.field("volume")[grain].sum()
+        found = network.coordination(snapshot.contacts, len(snapshot.grains), 3)
+        middle = (snapshot.grains.centre[:, 1] > low) & (snapshot.grains.centre[:, 1] < high) & ~found.is_rattler
+        start = snapshot.contact_interval[0]
+        impulse = np.diff(np.interp([start, frame.time], lid["time"], lid["impulse_y"]))[0]
+        push = impulse / (frame.time - start) if frame.time > start else 0.0
+        rows.append((area / (LENGTH * (high - low)), found.per_grain[middle].mean() if middle.any() else 0.0,
+                     push / LENGTH / SOFT))
+    return tuple(np.array(rows).T)
+
+
+def jamming_fit(fraction: np.ndarray, contacts: np.ndarray) -> tuple[float, float, float]:
+    """phi_0, xi and the exponent of Z - 4 = xi (phi - phi_0)^beta with least squares of the logarithms; xi with 1/2."""
+    use = contacts > ISOSTATIC + 0.1
+    y = np.log(contacts[use] - ISOSTATIC)
+    best = None
+    for jam in np.linspace(0.70, fraction[use].min() - 1e-3, 200):
+        x = np.log(fraction[use] - jam)
+        slope, level = np.polyfit(x, y, 1)
+        rest = ((y - slope * x - level) ** 2).sum()
+        half = (y - x / 2).mean()
+        rest_half = ((y - x / 2 - half) ** 2).sum()
+        best = (rest, rest_half, jam, slope, half) if best is None or rest_half < best[1] else best
+    return best[2], float(np.exp(best[4])), best[3]
+
+
+def soft_checks(folders: Folders) -> list[Check]:
+    found, pressures = [], []
+    for speed in LID_SPEEDS:
+        if (case := soft_label(speed)) not in folders:
+            continue
+        fraction, contacts, pressure = jammed(folders[case])
+        jam, xi, exponent = jamming_fit(fraction, contacts)
+        found += [record(case, "largest packing fraction", fraction.max()),
+                  record(case, "phi_0, with exponent 1/2", jam),
+                  record(case, "xi of Z - 4 = xi sqrt(phi - phi_0)", xi, XI),
+                  record(case, "exponent from that phi_0", exponent, 0.5)]
+        pressures.append(np.interp(0.9, fraction, pressure))
+    if len(pressures) > 1:
+        found.append(near("soft disks", "P at phi = 0.9, half as fast", pressures[1] / pressures[0], 1.0, 0.01))
+    return found
+
+
 def checks(folders: Folders) -> list[Check]:
-    return disk_checks(folders) + layer_checks(folders) + column_checks(folders)
+    return disk_checks(folders) + soft_checks(folders) + layer_checks(folders) + column_checks(folders)
 
 
 def draw(folders: Folders, out: Path) -> list[Path]:
@@ -199,6 +275,14 @@ def draw(folders: Folders, out: Path) -> list[Path]:
         panels.append(Panel("Sheared layer", "inertial number", "mu", [
             Curve("da Cruz et al. 2005", number, 0.25 + 1.1 * number, "k--"),
             Curve("here", np.array([m["I"] for m in layers]), np.array([m["mu"] for m in layers]), "o")]))
+    for speed in LID_SPEEDS:
+        if (case := soft_label(speed)) in folders:
+            fraction, contacts, pressure = jammed(folders[case])
+            jam, xi, _ = jamming_fit(fraction, contacts)
+            law = ISOSTATIC + xi * np.sqrt(np.maximum(fraction - jam, 0))
+            panels += [Panel(case, "packing fraction", "Z without rattlers", [
+                Curve("here", fraction, contacts, "o"), Curve(f"4 + {xi:.2g} sqrt(phi - {jam:.3f})", fraction, law, "k--")]),
+                       Panel(case, "packing fraction", "P / E", [Curve("here", fraction, pressure, "o-")])]
     if "column" in folders:
         times, reach, _ = front(folders["column"])
         panels.append(Panel("Column collapse", "time [s]", "reach of the heap [m]", [Curve("here", times, reach)]))
