@@ -53,7 +53,8 @@ def test_momentum_of_each_step(cairn: Program, here: Path):
     press = {"drive.0.velocity": "[0.0, -0.3]"}
     fall = {"grains.0.velocity": "[0.0, -3.0]", "domain.lower": "[-0.2, -0.42]", "domain.cells": "[50, 71]"}
     programs = {"oedometer": (200, press), "die": (200, press), "isotropic": (350, {}), "biaxial": (300, {}),
-                "plane_shear": (200, {}), "soft_disks": (250, {"drive.0.velocity": "[0.0, -0.4]"}), "column_collapse": (300, {}), "hopper": (650, fall)}
+                "plane_shear": (200, {}), "soft_disks": (250, {"drive.0.velocity": "[0.0, -0.4]"}),
+                "column_collapse": (300, {}), "hopper": (650, fall)}
     expect(set(programs) == {path.stem for path in CASES.glob("*.toml")}, "cases")
     for name, (steps, more) in programs.items():
         found = run(cairn, here, name, EVERY_STEP | {"time.steps": steps} | more)
