@@ -12,10 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from bodies import FACES
-from results import Frame, MissingData, Run
+from results import Frame, MissingData, Run, varies
 
 VOIGT = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])  # xx yy zz xy yz xz
-MOVES = {"velocity", "position", "piston", "servo"}  # keys with which a wall may stand elsewhere than its face
 MOST = 0.95  # of the centres, on whose far side a tool bounds the box
 SAME_TIME = 1e-9  # relative to the time of the last output
 
@@ -23,6 +22,12 @@ SAME_TIME = 1e-9  # relative to the time of the last output
 def tensors(components: np.ndarray, dimension: int) -> np.ndarray:
     """Rows of xx yy zz xy yz xz as tensors."""
     return components[:, VOIGT][:, :dimension, :dimension]
+
+
+def moves(wall: dict) -> bool:
+    """Whether a wall may stand elsewhere than its face."""
+    return any(key in wall for key in ("position", "piston", "servo")) or bool(wall.get("velocity")) and (
+        varies(wall["velocity"]) or any(wall["velocity"]))
 
 
 @dataclasses.dataclass
@@ -134,9 +139,13 @@ class Snapshot:
         return way - np.where(self.period > 0, np.rint(way / length) * length, 0.0)
 
     @cached_property
+    def contact_file(self) -> Frame:
+        return self.same_time(self.run.contacts, "contacts")
+
+    @cached_property
     def contacts(self) -> Contacts:
         """All contacts of grains, the force averaged since the contact file before."""
-        frame, d = self.same_time(self.run.contacts, "contacts"), self.dimension
+        frame, d = self.contact_file, self.dimension
         number_of = np.full(max(int(self.all_bodies.max(initial=0)), 0) + 2, -1)
         number_of[self.grains.body] = np.arange(len(self.grains))
         first, second = frame.field("body_a").astype(int), frame.field("body_b").astype(int)
@@ -155,16 +164,16 @@ class Snapshot:
         size = np.linalg.norm(found.force, axis=1)
         return found.chosen(size > self.threshold * size.mean() if len(size) else np.zeros(0, bool))
 
-    @cached_property
-    def walls(self) -> list[str]:
-        """Faces that bodies push against."""
+    def faces(self, kind: str) -> list[str]:
+        """Faces of the domain of a type."""
         return [name for name, face in self.run.case.get("boundary", {}).items()
-                if isinstance(face, dict) and face.get("type") in ("wall", "fixed", "symmetry")]
+                if isinstance(face, dict) and face.get("type") == kind]
 
     @property
-    def walls_in_contacts(self) -> bool:
-        """Whether contacts with walls are rows of the contact file, or there is no wall."""
-        return not self.walls or bool((self.contacts.partner < 0).any())
+    def unseen_faces(self) -> list[str]:
+        """Faces that push and have no rows in the contact file: fixed ones, and walls in files of older programs."""
+        rows = self.contact_file.has("moment") or bool((self.contacts.partner < 0).any())
+        return self.faces("fixed") + ([] if rows else self.faces("wall"))
 
     @property
     def contact_interval(self) -> tuple[float, float]:
@@ -184,12 +193,11 @@ class Snapshot:
         """Between walls and tools: the domain, cut where a wall stands now, or where a tool lies wholly on one side of
         nearly all the grains' centres."""
         lower, upper = self.run.lower.copy(), self.run.upper.copy()
-        for face, condition in self.run.case.get("boundary", {}).items():
-            if isinstance(condition, dict) and MOVES.intersection(condition) and condition.get("type") == "wall":
+        for face in self.faces("wall"):
+            if moves(self.run.case["boundary"][face]):
                 axis, high = divmod(FACES.index(face), 2)
-                rows = self.run.forces().get(face)
-                if rows is not None:
-                    (upper if high else lower)[axis] = np.interp(self.time, rows["time"], rows["xyz"[axis]])
+                rows = self.run.forces()[face]
+                (upper if high else lower)[axis] = np.interp(self.time, rows["time"], rows["xyz"[axis]])
         low, high = self.tool_extents
         centres = self.grains.centre
         for axis in range(self.dimension):

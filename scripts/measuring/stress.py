@@ -55,12 +55,12 @@ def boundary_moment(snapshot: Snapshot) -> np.ndarray:
     outer = contacts.chosen(contacts.b < 0)
     middle = np.average(grains.centre, axis=0, weights=grains.mass)
     total = np.einsum("ci,cj->ij", outer.force, outer.point - middle) + outer.moment.sum(axis=0)
-    if snapshot.walls_in_contacts:
+    if not snapshot.unseen_faces:
         return total
     tools, (start, end) = snapshot.run.forces(), snapshot.contact_interval
     if not end > start:
         raise MissingData("no forces were averaged before the first step")
-    for face in snapshot.walls:
+    for face in snapshot.unseen_faces:
         if face not in tools:
             raise MissingData(f"forces.csv has no rows of the face {face}")
         table = tools[face]
@@ -76,13 +76,17 @@ def boundary_moment(snapshot: Snapshot) -> np.ndarray:
 
 def cell_contact_stress(snapshot: Snapshot, volume: float) -> np.ndarray:
     """Love-Weber stress of the cell [Pa]: by branches where all contacts are rows, from outside otherwise."""
-    moment = contact_moment if snapshot.walls_in_contacts else boundary_moment
+    if snapshot.faces("symmetry"):
+        raise MissingData("what faces of symmetry bear is in no file")
+    moment = boundary_moment if snapshot.unseen_faces else contact_moment
     return moment(snapshot) / volume
 
 
 def unbalance(snapshot: Snapshot) -> np.ndarray:
-    """Of each grain |sum f + m g| / sum |f|; 0 where nothing acts. Contacts with walls must be rows."""
+    """Of each grain |sum f + m g| / (m g + sum |f|); 0 where nothing acts, NaN where gravity varies. Contacts with walls must be rows."""
     grains, contacts = snapshot.grains, snapshot.contacts
+    if snapshot.run.gravity_varies:
+        return np.full(len(grains), np.nan)
     total = grains.mass[:, None] * snapshot.run.gravity
     size = np.linalg.norm(total, axis=1)
     for rows, sign, chosen in ((contacts.a, 1, contacts), (contacts.b, -1, contacts.chosen(contacts.b >= 0))):

@@ -139,11 +139,12 @@ class Run:
         if sizes.shape != (self.dimension,) or not (np.isfinite(sizes) & (sizes > 0)).all():
             raise ValueError("the domain has no size, or its cells have none")
         gravity = domain.get("gravity")
-        self.gravity = self._vector(None if _varies(gravity) else gravity)  # [m/s2]
+        self.gravity_varies = varies(gravity)
+        self.gravity = self._vector(None if self.gravity_varies else gravity)  # [m/s2]; zero where it varies
         self.title = str(case.get("title") or self.folder.resolve().name)
         self._velocities = self._face_velocities()
         self._prescribed = [self._vector(drive.get("velocity")) for drive in case.get("drive", [])
-                            if "piston" not in drive and not _varies(drive.get("velocity"))]  # [m/s]
+                            if not _free(drive)]  # [m/s]
         if not self.point_spacing > 0:
             raise ValueError(f"solver.points_per_cell gives a spacing of {self.point_spacing}")
 
@@ -204,12 +205,12 @@ class Run:
         """Velocity [m/s] of every face that is fixed, is a wall, or carries driven bodies."""
         velocities = {}
         for face, condition in self.case.get("boundary", {}).items():
-            if isinstance(condition, dict) and condition.get("type") in ("fixed", "wall") and not _varies(
+            if isinstance(condition, dict) and condition.get("type") in ("fixed", "wall") and not varies(
                     condition.get("velocity")):
                 velocities[face] = self._vector(condition.get("velocity"))
         for drive in self.case.get("drive", []):
             face = drive.get("bodies", drive).get("overlapping")
-            if face and "piston" not in drive and not _varies(drive.get("velocity")):
+            if face and not _free(drive):
                 velocities[face] = self._vector(drive.get("velocity"))
         return velocities
 
@@ -331,7 +332,12 @@ class Run:
         return table
 
 
-def _varies(velocity) -> bool:
+def _free(drive: dict) -> bool:
+    """Whether the velocity of a drive is none that is the same all the time."""
+    return "piston" in drive or "servo" in drive or varies(drive.get("velocity"))
+
+
+def varies(velocity) -> bool:
     """A velocity that changes with time: rows of a table, or formulas among its components."""
     return isinstance(velocity, list) and any(isinstance(component, (list, str)) for component in velocity)
 

@@ -27,7 +27,7 @@ from made_up_runs import (DENSITY, R, close, padded, start_run, write_contacts, 
                           write_rows)
 from measuring import coarse, collect, motion, network, pairs, stress  # noqa: E402
 from measuring.snapshot import Contacts, Snapshot  # noqa: E402
-from results import Run  # noqa: E402
+from results import MissingData, Run  # noqa: E402
 
 FORCE = 3.0  # in each contact of a lattice [N]
 
@@ -237,6 +237,32 @@ def test_coarse_graining_of_a_stated_flow(_cairn: Program, here: Path):
     expect(np.abs(found.velocity[inner][..., 0] - 2 * y).max() < 1e-3, "the velocity")
     # The mean of y^2 over Lucy's kernel in 2D is 5 c^2 / 56.
     expect(abs(found.temperature[inner].mean() / (4 * 0.15**2 * 5 / 56 / 2) - 1) < 0.02, found.temperature[inner].mean())
+
+
+def test_walls_that_move_bound_the_box(_cairn: Program, here: Path):
+    """Where they stand is in forces.csv; that it is missing is said. Gravity and drives may follow formulas."""
+    more = """[boundary]
+left = { type = "wall" }
+top = { type = "wall", position = 1.5, servo = { pressure = 1.0 } }
+[[drive]]
+ids = [1]
+velocity = ["sin(t)", 0.0]
+"""
+    centre = np.array([[0.5, 0.5], [1.0, 0.5]])
+    start_run(here / "run", [2, 2], [False, False], centre, more)
+    case = here / "run" / "case.toml"
+    case.write_text(case.read_text().replace("[contact]", "gravity = [[0.0, 0.0, 0.0], [1.0, 0.0, -9.81]]\n[contact]", 1))
+    write_grains(here / "run", 0, 1.0, centre)
+    snapshot = Snapshot(Run(here / "run"), 0)
+    expect(list(snapshot.grains.body) == [0], f"the driven one is a tool: {snapshot.grains.body}")
+    try:
+        expect(not snapshot.box, "no forces.csv")
+    except MissingData as reason:
+        expect("output.forces" in str(reason), reason)
+    rows = ["step,time,name,x,y", "0,0.0,top,1.0,1.5", "1,2.0,top,1.0,1.1", ""]
+    (here / "run" / "forces.csv").write_text("\n".join(rows))
+    lower, upper = Snapshot(Run(here / "run"), 0).box
+    close(np.array([*lower, *upper]), np.array([0, 0, 0.95, 1.3]), 1e-12)
 
 
 def test_pairs_against_a_naive_search(_cairn: Program, _here: Path):
