@@ -268,6 +268,21 @@ Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, CrackPoint<
 
 }  // namespace
 
+/// Of the material in a row, as strains see it at the start of a step.
+template <int Dim>
+Vec<Dim> start_velocity(const CrackSurroundings<Dim>& around, int crack, const typename FaceRows<Dim>::At& at) {
+  double mass = 0;
+  Vec<Dim> momentum = Vec<Dim>::Zero();
+  for (const auto& piece : around.patch.pieces) {
+    const int row = row_at<Dim>(around, crack, piece, at.place, at.sides);
+    if (row < 0) continue;
+    const double* sums = piece.nodes.sums.data() + static_cast<std::size_t>(row) * NodeSums<Dim>::width;
+    mass += sums[NodeSums<Dim>::mass];
+    momentum += Eigen::Map<const Vec<Dim>>(sums + NodeSums<Dim>::momentum);
+  }
+  return momentum / mass;
+}
+
 template <int Dim>
 std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,
                                                   const CrackSurroundings<Dim>& around) {
@@ -317,17 +332,27 @@ void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
 }
 
 template <int Dim>
-std::vector<RowForce<Dim>> find_row_forces(const CrackSurroundings<Dim>& around) {
+std::vector<RowForce<Dim>> find_row_forces(
+    const CrackSurroundings<Dim>& around, double ahead,
+    const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>& traction) {
   std::vector<RowForce<Dim>> forces;
   for (const auto& point : around.patch.cracks) {
     const bool carries = point.bond.state == Bond::holds && point.bond.length > 0 && point.faces_filled == 3;
     if (!carries || around.cracks[point.crack].is_tip(point.index)) continue;
+    std::array<FaceRows<Dim>, 2> rows;
+    Vec<Dim> opening = point.opening();
+    bool whole = point.own;  // else a neighbour, which does not know both faces, answers for one
     for (const int side : {-1, 1}) {
-      if (!answers_for_face(around, point, side)) continue;
-      const Vec<Dim> force = -side * point.bond.length * point.traction;
-      for (const auto& at : rows_of_face(around, point, side).rows)
-        forces.push_back({around.patch.id, point.crack, point.index, side, at.place, at.sides, at.weight * force});
+      if (answers_for_face(around, point, side)) rows[side > 0] = rows_of_face(around, point, side);
+      whole = whole && rows[side > 0].is_filled();
     }
+    for (const int side : {-1, 1})
+      for (const auto& at : rows[side > 0].rows)
+        if (whole) opening += side * ahead * at.weight * start_velocity<Dim>(around, point.crack, at);
+    const Vec<Dim> pull = point.bond.length * traction(point, opening);
+    for (const int side : {-1, 1})
+      for (const auto& at : rows[side > 0].rows)
+        forces.push_back({around.patch.id, point.crack, point.index, side, at.place, at.sides, -side * at.weight * pull});
   }
   return forces;
 }
@@ -365,7 +390,9 @@ void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, con
   template std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>&,        \
                                                              const CrackSurroundings<Dim>&);       \
   template double fill_at(const CrackSurroundings<Dim>&, int, const Vec<Dim>&);                     \
-  template std::vector<RowForce<Dim>> find_row_forces(const CrackSurroundings<Dim>&);              \
+  template std::vector<RowForce<Dim>> find_row_forces(                                             \
+      const CrackSurroundings<Dim>&, double,                                                       \
+      const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>&);                    \
   template void sort_row_forces(std::vector<RowForce<Dim>>&);                                      \
   template void add_row_forces(Patch<Dim>&, const CrackSurroundings<Dim>&, const std::vector<RowForce<Dim>>&); \
   template void borrow_face_velocities(std::vector<CrackPoint<Dim>>&);

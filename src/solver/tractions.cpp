@@ -83,11 +83,11 @@ struct Opening {
   Vec<Dim> normal = Vec<Dim>::Zero(), along = Vec<Dim>::Zero();
   TractionLaw::Modes d{};
 
-  Opening(const CrackSegments<Dim>& segments, const CrackPoint<Dim>& point) {
+  Opening(const CrackSegments<Dim>& segments, const CrackPoint<Dim>& point, const Vec<Dim>& opening) {
     if constexpr (Dim == 2) {
       normal = segments.normal_near(point.crack, point.plane);
       along = {normal.y(), -normal.x()};
-      d = {point.opening().dot(normal), point.opening().dot(along)};
+      d = {opening.dot(normal), opening.dot(along)};
     }
   }
 };
@@ -103,7 +103,7 @@ void Simulation<Dim>::follow_openings() {
     for (auto& point : patch.cracks) {
       if (point.bond.state == Bond::none) continue;
       const TractionLaw& law = *traction_laws_[point.crack];
-      const Opening<Dim> opening(segments_of(patch), point);
+      const Opening<Dim> opening(segments_of(patch), point, point.opening());
       law.follow(opening.d, point.bond);
       const auto T = law.traction(opening.d, point.bond);
       point.traction = T[0] * opening.normal + T[1] * opening.along;
@@ -122,7 +122,17 @@ std::array<double, 2> Simulation<Dim>::energies_of(const CrackPoint<Dim>& point)
 
 template <int Dim>
 void Simulation<Dim>::find_tractions(std::size_t p) {
-  if (!traction_laws_.empty()) row_forces_[p] = find_row_forces(surroundings_of(patches_[p]));
+  if (traction_laws_.empty()) return;
+  const auto traction = [&](const CrackPoint<Dim>& point, const Vec<Dim>& ahead) -> Vec<Dim> {
+    const TractionLaw& law = *traction_laws_[point.crack];
+    const Opening<Dim> opening(segments_[p], point, ahead);
+    Bond bond = point.bond;  // what it will be then; its history follows the openings at the ends of steps
+    law.follow(opening.d, bond);
+    const auto T = law.traction(opening.d, bond);
+    return T[0] * opening.normal + T[1] * opening.along;
+  };
+  const double share = solver_.stress_update == StressUpdate::both ? 0.5 : 1.0;
+  row_forces_[p] = find_row_forces<Dim>(surroundings_of(patches_[p]), share * dt_, traction);
 }
 
 template <int Dim>

@@ -42,10 +42,12 @@ TEST(Growth, TakesTheEnergyOfItsArea) {
       tear(simulation, angle, 0.2);
       const Totals start = simulation.totals();
       double before = 0, worst = 0;
-      while (simulation.time() < 0.5) {
+      double after = 0;  // what is left of the law breaks after the crack has come through
+      while (simulation.time() < 2 && after < 0.2) {
         simulation.step(1e300);
         const Totals t = simulation.totals();
-        EXPECT_GE(t.crack_dissipation, before);
+        EXPECT_GE(t.crack_dissipation, before * (1 - 1e-12));
+        if (simulation.cracks()[0].open[1]) after += simulation.dt();
         before = t.crack_dissipation, worst = std::max(worst, std::abs(t.energy() - start.energy()));
       }
       const Crack& crack = simulation.cracks()[0];
@@ -64,7 +66,7 @@ TEST(Growth, ATipEndsAtAnotherCrack) {
   c.cracks[1].ends = {CrackEnd::tip, CrackEnd::tip};
   Simulation<2> simulation(c, MPI_COMM_SELF);
   tear(simulation, 0, 0.2);
-  while (simulation.time() < 0.3) simulation.step(1e300);
+  while (simulation.time() < 1 && !simulation.cracks()[0].joined[1]) simulation.step(1e300);
   const Crack& crack = simulation.cracks()[0];
   EXPECT_TRUE(crack.joined[1]);
   EXPECT_NEAR(crack.grown[1], 0.6213 - 0.3, 0.02);
@@ -103,11 +105,11 @@ TEST(Split, PartsBecomeBodies) {
   Case c = soft_case(2, 30, 10);
   add_body(c, Ball{Vec3(0.5, 0.5, 0), 0.3});
   add_crack(c, {Vec3(0.15, 0.403, 0), Vec3(0.85, 0.403, 0)}, CrackLaw::friction);
-  add_crack(c, {Vec3(0.503, 0.403, 0), Vec3(0.503, 0.85, 0)}, CrackLaw::friction);
+  add_crack(c, {Vec3(0.15, 0.597, 0), Vec3(0.85, 0.597, 0)}, CrackLaw::friction);
   c.crack.split = 10;
   Simulation<2> simulation(c, MPI_COMM_SELF);
-  const auto part_of = [](const Vec<2>& x) { return x.y() < 0.403 ? 2 : x.x() < 0.503 ? 0 : 1; };
-  const Vec<2> away[3] = {{-0.2, 0.1}, {0.2, 0.1}, {0.0, -0.2}};
+  const auto part_of = [](const Vec<2>& x) { return x.y() < 0.403 ? 2 : x.y() < 0.597 ? 0 : 1; };
+  const Vec<2> away[3] = {{0.0, 0.0}, {0.1, 0.2}, {0.0, -0.2}};
   set_velocities(simulation, [&](const Vec<2>& x) -> Vec<2> { return away[part_of(x)]; });
   const auto start = points_of(simulation);
   for (int i = 0; i < 25; ++i) simulation.step(1e300);

@@ -1,6 +1,8 @@
 #pragma once
 /// How cracks move with the material: their faces see the rows on their side.
 
+#include <functional>
+
 #include "cairn/core/options.hpp"
 #include "cairn/crack/sides.hpp"
 
@@ -67,9 +69,14 @@ struct RowForce {
   Vec<Dim> force;  // [N]
 };
 
-/// The tractions of the crack points whose faces lie among the patch's nodes, as forces on rows; with complete masses.
+/// The tractions of the crack points whose faces lie among the patch's nodes, as forces on rows; with complete masses
+/// and the momenta that strains see at the start of the step. Tractions are those of the opening `ahead` [s] later, where
+/// strains see the stress as well: so that the faces' motion and the forces are a leapfrog.
+/// \param traction  of a crack point with some opening, on its lower face [Pa]
 template <int Dim>
-std::vector<RowForce<Dim>> find_row_forces(const CrackSurroundings<Dim>& around);
+std::vector<RowForce<Dim>> find_row_forces(
+    const CrackSurroundings<Dim>& around, double ahead,
+    const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>& traction);
 
 /// Puts forces in the order in which they are added. Of a face that several patches tell of, the first counts.
 template <int Dim>
