@@ -282,9 +282,10 @@ void check_walls(const Case& c, Errors& errors) {
       const Bounds b = bounds(c.bodies[i].shape);
       const double end = face % 2 ? b.upper[k] : b.lower[k];
       if (face % 2 ? end > plane + rounding : end < plane - rounding)
-        errors.add({c.bodies[i].source, 0}, "",
-                   fmt::format("body {} reaches to {} = {}, beyond the wall {}, which stands at {}; move one of the two", i,
-                               "xyz"[k], end, face_names[face], plane));
+        errors.add(
+            {c.bodies[i].source, 0}, "",
+            fmt::format("body {} reaches to {} = {}, beyond the wall {}, which stands at {}; move one of the two", i,
+                        "xyz"[k], end, face_names[face], plane));
     }
   }
 }

@@ -8,8 +8,8 @@ namespace cairn::reading {
 /// One [[grains]] entry: a table of balls and what they share.
 struct GrainsSpec {
   std::filesystem::path given, file;  // as the case has it, and absolute; empty where there is none
-  std::string copy;            // its name beside the results
-  int material = -1;           // -1: every row names its own
+  std::string copy;                   // its name beside the results
+  int material = -1;                  // -1: every row names its own
   Vec3 velocity = Vec3::Zero(), angular_velocity = Vec3::Zero();
   double initial_pressure = 0;
   std::string group;
@@ -18,10 +18,10 @@ struct GrainsSpec {
 /// A case while it is read.
 struct Draft {
   Case result;
-  bool domain_known = false;       // the domain was read without an error
-  bool bodies_known = true;        // every grain table was read, so that the number of bodies is right
-  std::size_t shaped_bodies = 0;   // bodies from [[bodies]]; the rest come from the tables
-  std::vector<GrainsSpec> grains;  // in order
+  bool domain_known = false;                 // the domain was read without an error
+  bool bodies_known = true;                  // every grain table was read, so that the number of bodies is right
+  std::size_t shaped_bodies = 0;             // bodies from [[bodies]]; the rest come from the tables
+  std::vector<GrainsSpec> grains;            // in order
   std::vector<std::string> inserted_tables;  // for each [[insert]] the copy of its table; empty where it has none
 };
 

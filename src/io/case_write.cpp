@@ -121,13 +121,13 @@ class Writer {
   /// `along` is not given for walls. Nothing where there is no piston.
   std::string piston_of(const Piston& p, bool along) const {
     if (p.mass == 0) return {};
-    std::string text = fmt::format("{} = {{ {} = {}", p.gain > 0 ? "servo" : "piston", p.pressure ? "pressure" : "force",
-                                   table_of(p.force, 0, 1));
+    std::string text = fmt::format("{} = {{ {} = {}", p.gain > 0 ? "servo" : "piston",
+                                   p.pressure ? "pressure" : "force", table_of(p.force, 0, 1));
     if (p.force.repeat) text += ", repeat = true";
     if (p.area > 0) text += ", area = " + text_of(p.area);
     if (along) text += ", along = " + list_of(p.along, dim_);
     text += p.gain > 0 ? fmt::format(", gain = {}, largest = {}", text_of(p.gain), text_of(p.largest))
-                    : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
+                       : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
     return text + " }";
   }
   void drive(const Drive& d) {

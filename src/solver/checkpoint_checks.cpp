@@ -123,8 +123,7 @@ template <int Dim>
 std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, std::size_t body_count,
                        std::size_t partner_count) {
   const auto& [a, b] = bodies;
-  if (a < 0 || a >= b || static_cast<std::size_t>(a) >= body_count ||
-      static_cast<std::size_t>(b) >= partner_count)
+  if (a < 0 || a >= b || static_cast<std::size_t>(a) >= body_count || static_cast<std::size_t>(b) >= partner_count)
     return fmt::format("it holds a contact of bodies {} and {}; the case has {} bodies", a, b, body_count);
   for (const double value : sum.values)
     if (!std::isfinite(value)) return fmt::format("the contact of bodies {} and {} is not finite", a, b);
@@ -140,7 +139,8 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   add("time", state.step.time), add("step", state.step.steps);
   for_each_number(state, add);
   for (const auto& entry : state.series) add(entry.name, entry.time);
-  sum.add_values(std::span(state.stage)), sum.add_values(std::span(state.pouring)), sum.add_values(std::span(state.tools));
+  sum.add_values(std::span(state.stage)), sum.add_values(std::span(state.pouring)),
+      sum.add_values(std::span(state.tools));
   add("case", std::ssize(case_text));
   sum.add_values(std::span(case_text.data(), case_text.size()));
   return sum.value();

@@ -79,7 +79,7 @@ struct Piece {
   int body;
   Points<Dim> points;
   NodeBox<Dim> nodes;
-  bool projected = false;        // the nodes have the sums of the points as they are
+  bool projected = false;         // the nodes have the sums of the points as they are
   Vec3 net_force = Vec3::Zero();  // in the last step at the nodes that the patch answers for, where it is asked for [N]
 
   Piece(int body_, int states) : body(body_), points(states) {}

@@ -18,7 +18,7 @@ struct ToolSum {
   static constexpr int size = 7;
   std::array<double, size> total{};  // since the start: impulse [N s], its moment about the origin [N m s], work that
                                      // the tool did on bodies [J]
-  std::array<double, 6> last{};  // in the last step: impulse and moment
+  std::array<double, 6> last{};      // in the last step: impulse and moment
 
   /// Adds an impulse on the tool [N s] at x [m], and the work that it did [J].
   void add(const Vec3& impulse, const Vec3& x, double work) {
@@ -40,14 +40,14 @@ struct ToolSum {
 /// A servo is one as light as a few cells of material, with the damping that gives it the velocity
 /// (force - what presses back) / damping.
 struct Piston {
-  double mass = 0;            // [kg]; 0: not a piston
-  Vec3 along = Vec3::Zero();  // unit
-  MotionTable force;          // its x component [N], or [Pa] where it is a pressure
-  double damping = 0;         // [N s/m]; of a servo 1 / gain
-  double gain = 0;            // of a servo [m/(N s)]; 0: not a servo
+  double mass = 0;                                           // [kg]; 0: not a piston
+  Vec3 along = Vec3::Zero();                                 // unit
+  MotionTable force;                                         // its x component [N], or [Pa] where it is a pressure
+  double damping = 0;                                        // [N s/m]; of a servo 1 / gain
+  double gain = 0;                                           // of a servo [m/(N s)]; 0: not a servo
   double largest = std::numeric_limits<double>::infinity();  // [m/s]
-  bool pressure = false;      // the force is that of a pressure on an area
-  double area = 0;            // [m^(Dim-1)]; 0: of the face between the other faces, where they stand
+  bool pressure = false;                                     // the force is that of a pressure on an area
+  double area = 0;  // [m^(Dim-1)]; 0: of the face between the other faces, where they stand
 };
 
 /// Numbers of a tool's state.

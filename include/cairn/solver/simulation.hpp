@@ -140,8 +140,8 @@ class Simulation {
   void keep_balance(bool keep) { keep_balance_ = keep; }
   /// Of the last step, the same on every rank.
   const ForceBalance& force_balance() const { return balance_; }
-  /// Where pouring stands: the next point's number, and for each [[insert]] how many of its bodies came, how often a place
-  /// was drawn, and when the next body may come [s].
+  /// Where pouring stands: the next point's number, and for each [[insert]] how many of its bodies came, how often a
+  /// place was drawn, and when the next body may come [s].
   std::vector<double> pouring() const;
   /// Goes on with what a stage changes: motions of tools, gravity, friction, damping, the length of steps, and what is
   /// kept for output. Collective.
