@@ -183,8 +183,8 @@ void ContactSweep<Dim>::add_wall_pairs(const Node& node, const Patch<Dim>& patch
       const double* sums = whole.data();
       if (!(sums[N::mass] > 0)) continue;
       pair.open = true;
-      // The room of which contact/gap.hpp speaks is that without the wall. What lies beyond the wall has a gradient that
-      // points back in: its size would read as a gap on this side.
+      // The room of which contact/gap.hpp speaks is that without the wall. What lies beyond the wall has a gradient
+      // that points back in: its size would read as a gap on this side.
       const bool beyond = pair.normal.dot(ConstNode<Dim>(sums + N::gradient)) < 0;
       const double room = settings.room(on_wall, lattice, face);
       pair.gap = beyond ? 0.0 : settings.distance(sums, pair.normal, lattice, room) + to_plane;

@@ -163,8 +163,8 @@ std::vector<double> sizes_of_bodies(const Simulation<Dim>& simulation, const std
   constexpr int width = 5;
   std::vector<double> records;
   for (const PieceVector& part : parts)
-    records.insert(records.end(), {double(part.body), std::bit_cast<double>(part.patch), part.value[0], part.value[1],
-                                   part.value[2]});
+    records.insert(records.end(),
+                   {double(part.body), std::bit_cast<double>(part.patch), part.value[0], part.value[1], part.value[2]});
   const auto incoming = send_home(records, width, shares_of(simulation), simulation.communicator());
   std::map<std::pair<int, PatchId>, Vec3> ordered;
   for (std::size_t i = 0; i < incoming.size(); i += width)

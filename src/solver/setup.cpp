@@ -1,3 +1,5 @@
+#include "setup.hpp"
+
 #include <fmt/format.h>
 
 #include <map>
@@ -14,7 +16,6 @@
 #include "cairn/solver/volume.hpp"
 #include "filler.hpp"
 #include "memory.hpp"
-#include "setup.hpp"
 
 namespace cairn {
 namespace {

@@ -132,9 +132,10 @@ void Simulation<Dim>::aim_walls() {
     const int d = face / 2;
     const double to = transfer_.wall_from[d][face % 2] + dt_ * tools_[face].of_step()[d];
     if (to < lattice_.lower()[d] - 1e-9 * lattice_.length(d) || to > lattice_.upper()[d] + 1e-9 * lattice_.length(d))
-      throw RunError(fmt::format("step {}: the wall {} leaves the domain; let the domain be larger and the wall begin "
-                                 "inside, at boundary.{}.position",
-                                 steps_ + 1, tools_[face].name, tools_[face].name));
+      throw RunError(
+          fmt::format("step {}: the wall {} leaves the domain; let the domain be larger and the wall begin "
+                      "inside, at boundary.{}.position",
+                      steps_ + 1, tools_[face].name, tools_[face].name));
     transfer_.wall_to[d][face % 2] = to;
     if (transfer_.wall_to[d][0] >= transfer_.wall_to[d][1])
       throw RunError(fmt::format("step {}: the walls {} and {} meet", steps_ + 1, names_of_faces[2 * d],

@@ -52,12 +52,12 @@ inline constexpr LedgerColumn ledger_columns[] = {{"contact_dissipation", &Patch
                                                   {"momentum_left_y", &PatchLedger::momentum_left_y},
                                                   {"momentum_left_z", &PatchLedger::momentum_left_z}};
 
-/// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared. A wall counts as a body:
-/// its number is that of all bodies plus that of its face.
+/// What passed between two bodies a < b at a patch's nodes since the contacts were last cleared. A wall counts as a
+/// body: its number is that of all bodies plus that of its face.
 template <int Dim>
 struct ContactSum {
-  /// Sum of |impulse| [N s], impulse on a, |impulse| x position, |impulse| x normal (from a to b), impulse (x) position,
-  /// |impulse| x way slipped, work of friction [J], |impulse| where it sticks.
+  /// Sum of |impulse| [N s], impulse on a, |impulse| x position, |impulse| x normal (from a to b), impulse (x)
+  /// position, |impulse| x way slipped, work of friction [J], |impulse| where it sticks.
   static constexpr int impulse = 1, place = 1 + Dim, normal = 1 + 2 * Dim, moment = 1 + 3 * Dim;
   static constexpr int slip = moment + Dim * Dim, friction = slip + 1, stuck = slip + 2, size = slip + 3;
   std::array<double, size> values{};

@@ -40,14 +40,14 @@ struct ToolSum {
 /// A servo is one as light as a few cells of material, with the damping that gives it the velocity
 /// (force - what presses back) / damping.
 struct Piston {
-  double mass = 0;            // [kg]; 0: not a piston
-  Vec3 along = Vec3::Zero();  // unit
-  MotionTable force;          // its x component [N], or [Pa] where it is a pressure
-  double damping = 0;         // [N s/m]; of a servo 1 / gain
-  double gain = 0;            // of a servo [m/(N s)]; 0: not a servo
+  double mass = 0;                                           // [kg]; 0: not a piston
+  Vec3 along = Vec3::Zero();                                 // unit
+  MotionTable force;                                         // its x component [N], or [Pa] where it is a pressure
+  double damping = 0;                                        // [N s/m]; of a servo 1 / gain
+  double gain = 0;                                           // of a servo [m/(N s)]; 0: not a servo
   double largest = std::numeric_limits<double>::infinity();  // [m/s]
-  bool pressure = false;      // the force is that of a pressure on an area
-  double area = 0;            // [m^(Dim-1)]; 0: of the face between the other faces, where they stand
+  bool pressure = false;                                     // the force is that of a pressure on an area
+  double area = 0;  // [m^(Dim-1)]; 0: of the face between the other faces, where they stand
 };
 
 /// Numbers of a tool's state.

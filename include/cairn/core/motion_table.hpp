@@ -33,7 +33,8 @@ struct MotionTable {
       for (const Vec3& v : values) most = std::max(most, v.norm());
       return most;
     }
-    for (int i = 0; i <= 64; ++i) most = std::max(most, at(start + (std::isfinite(until) ? i / 64.0 * until : 0)).norm());
+    for (int i = 0; i <= 64; ++i)
+      most = std::max(most, at(start + (std::isfinite(until) ? i / 64.0 * until : 0)).norm());
     return most;
   }
   Vec3 at(double t) const {

@@ -104,13 +104,13 @@ bool moves(const Face& face, int number);
 
 /// Bodies that come into a running simulation, one after the other.
 struct Insert {
-  int first = 0, count = 0;                          // its bodies
-  bool drawn = false;                                // their centres are drawn from the region, else as they are given
-  Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();   // of that region, which holds whole bodies [m]
-  double start = 0, interval = 0;                    // time of the first, and between two at least [s]
-  std::uint64_t seed = 1;                            // of what is drawn
-  int every = 10;                                    // steps between attempts
-  std::string text;                                  // the entry as it was given, for case.toml
+  int first = 0, count = 0;                         // its bodies
+  bool drawn = false;                               // their centres are drawn from the region, else as they are given
+  Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();  // of that region, which holds whole bodies [m]
+  double start = 0, interval = 0;                   // time of the first, and between two at least [s]
+  std::uint64_t seed = 1;                           // of what is drawn
+  int every = 10;                                   // steps between attempts
+  std::string text;                                 // the entry as it was given, for case.toml
 };
 
 /// Bodies whose centres of mass lie in a region leave.

@@ -29,7 +29,8 @@ class OutputClock {
   }
   /// Whether it may be due after a step whose time is not known yet.
   bool may_be_due(std::int64_t step) const {
-    return (schedule_.every > 0 && step % schedule_.every == 0) || schedule_.interval > 0 || schedule_.interval_wall > 0;
+    return (schedule_.every > 0 && step % schedule_.every == 0) || schedule_.interval > 0 ||
+           schedule_.interval_wall > 0;
   }
   /// Goes by other intervals from now on.
   void change(const Schedule& schedule) { schedule_ = schedule; }

@@ -32,7 +32,7 @@ struct TransferSettings {
   std::array<std::array<bool, 2>, Dim> walled{};    // sides that are walls, which no point crosses
   // Where these stand at the start and the end of the step [m].
   std::array<std::array<double, 2>, Dim> wall_from{}, wall_to{};
-  bool extras = false;                              // stress and position sums are needed
+  bool extras = false;  // stress and position sums are needed
   bool normals_needed = true;
   std::vector<double> stretch;  // of bodies at the start, the measure of their domains with CPDI; empty: all 1
 
