@@ -4,7 +4,7 @@
 _cairn() {
   local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} command=${COMP_WORDS[1]} words=""
   if ((COMP_CWORD == 1)); then
-    mapfile -t COMPREPLY < <(compgen -W "run check info pack init keys plot measure compare-runs convert-grains convert-labels convert-cells --help --version" -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W "run check info pack init keys plot measure view report export compare-runs convert-grains convert-labels convert-cells --help --version" -- "$word")
     return
   fi
   case $before in
@@ -18,8 +18,11 @@ _cairn() {
     run) words="--out --set --restart --allow-changes --overwrite --profile --help" ;;
     check) words="--set --help" ;;
     pack) words="-o --help" ;;
-    plot) words="--compare --film --raw-stress --fringes --times --help" ;;
     measure) words="--at --every -o --table --only --box --threshold --rattlers --radius --cell --across --bins --by-points --help" ;;
+    plot) words="--compare --film --raw-stress --fringes --times --colour --range --clip --azimuth --elevation --zoom --perspective --size --help" ;;
+    view) words="--out --values --size --help" ;;
+    report) words="--out --pdf --help" ;;
+    export) words="--out --form --times --help" ;;
     *) words="--help" ;;
   esac
   if [[ $word == -* ]]; then mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word"); fi

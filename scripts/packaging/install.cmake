@@ -8,12 +8,12 @@ foreach(level IN LISTS levels)
     install(TARGETS cairn_${level} RUNTIME DESTINATION libexec/cairn)
   endif()
 endforeach()
-install(PROGRAMS scripts/plot scripts/measure scripts/python scripts/compare-runs scripts/convert-grains
-        scripts/convert-labels scripts/convert-cells DESTINATION libexec/cairn)
+install(PROGRAMS scripts/plot scripts/measure scripts/view scripts/report scripts/export scripts/paraview scripts/python
+        scripts/compare-runs scripts/convert-grains scripts/convert-labels scripts/convert-cells DESTINATION libexec/cairn)
 install(DIRECTORY scripts/plotting scripts/measuring scripts/converting DESTINATION libexec/cairn
-        FILES_MATCHING PATTERN *.py)
+        FILES_MATCHING PATTERN *.py PATTERN viewer*)
 install(DIRECTORY cases DESTINATION share/cairn)
-install(DIRECTORY docs/ DESTINATION share/doc/cairn FILES_MATCHING PATTERN *.md)
+install(DIRECTORY docs/ DESTINATION share/doc/cairn FILES_MATCHING PATTERN *.md PATTERN *.png)
 install(FILES README.md LICENSE ARCHITECTURE.md CONTRIBUTING.md DESTINATION share/doc/cairn)
 install(PROGRAMS scripts/slurm-example.sh DESTINATION share/doc/cairn)
 install(FILES scripts/packaging/cairn.bash DESTINATION share/bash-completion/completions RENAME cairn)

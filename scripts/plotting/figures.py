@@ -7,6 +7,8 @@ Comput. Methods Appl. Mech. Engrg. 187 (2000) 529-541, section 4.2.
 
 from __future__ import annotations
 
+import textwrap
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -14,10 +16,18 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.collections import LineCollection
 
+import colours
 import laboratory
 import raster
-from results import Frame, MissingData, Run, Shear, displacement, principal_stress_difference
+from canvas import beside, prefixed
+from chains import STRONG, WEAK, loaded, network, widest
+from photoelastic import nearest_frames
+from results import Frame, MissingData, Run, Shear, displacement
+from scalars import SCALARS, Scalar, scalar
+from scalars import scale as scale_of
+from space import Scene, middle_plane
 
 PIXELS = 900  # on the longer side of a picture of the domain
 FIGURE_6_SHEAR = 0.75
@@ -40,37 +50,53 @@ def label(run: Run, frame: Frame) -> str:
     return f"{100 * shear.fraction(frame.time):.0f} % shear"
 
 
-def owners(run: Run, frame: Frame, pixels: int = PIXELS) -> np.ndarray:
-    """Index of the material point that each pixel of the domain shows (2D)."""
-    position = frame.field("position")[:, :2]
-    return raster.nearest_point(position, run.point_spacing, run.lower, run.upper, run.periodic, pixels)
-
-
-def grain_picture(run: Run, frame: Frame, pixels: int = PIXELS) -> tuple[np.ndarray, tuple]:
-    """Bodies in different colours on black, and the extent of the picture (left, right, bottom, top) [m]."""
+def pixels_of(run: Run, frame: Frame, pixels: int) -> raster.Pixels:
+    """The pixels of the domain (2D), `pixels` on the longer side."""
     if frame.points == 0:
         raise MissingData(f"{frame.path.name} holds no points")
-    body, driven = frame.field("body"), run.driven_bodies
-    if run.dimension == 2:
-        extent = (run.lower[0], run.upper[0], run.lower[1], run.upper[1])
-        return raster.paint_bodies(owners(run, frame, pixels), body, driven), extent
-    gravity = np.abs(run.gravity)
-    up = int(gravity.argmax()) if gravity.max() > 0 else 1
-    ends = np.array([run.lower, run.upper])
-    corners = np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
-    position = frame.field("position")
-    return raster.paint_space(position, body, driven, run.point_spacing, corners, up, pixels)
+    position = frame.field("position")[:, :2]
+    return raster.Pixels(position, run.point_spacing, run.lower, run.upper, run.periodic, pixels)
 
 
-def _show(axes, run: Run, picture: np.ndarray, extent: tuple, title: str, **options):
+def bodies_of(frame: Frame) -> np.ndarray:
+    """The body of each point."""
+    return frame.field("body") if frame.has("body") else np.zeros(frame.points, int)
+
+
+def grain_picture(run: Run, frame: Frame, pixels: int = PIXELS, colour=None) -> np.ndarray:
+    """Bodies in different colours (2D; rows upwards)."""
+    return raster.paint_bodies(pixels_of(run, frame, pixels).nearest(), bodies_of(frame), colour or colours.of_run(run))
+
+
+def value_picture(run: Run, frame: Frame, values: np.ndarray, scale: tuple, pixels: int = PIXELS) -> np.ndarray:
+    """Points' values in the colours of a scale (low, high, name) (2D; rows upwards)."""
+    place, body = pixels_of(run, frame, pixels), bodies_of(frame)
+    owner = place.nearest()
+    shown = values[owner] if run.raw_stress else place.blended(owner, body, values)
+    return raster.paint_values(owner, body, colours.mapped(shown, *scale))
+
+
+def _title(run: Run, frame: Frame) -> str:
+    return f"{run.title}, {label(run, frame)}"
+
+
+def _show(axes, run: Run, picture: np.ndarray, title: str):
+    """A picture of the domain (2D) with its scales; a failed run's title is red."""
     factor, unit = length_unit(run)
-    shown = axes.imshow(picture, origin="lower", extent=[factor * e for e in extent], interpolation="antialiased",
-                        **options)
-    axes.set_title(title, fontsize=10)
-    axes.set_xlabel(f"[{unit}]")
-    if run.dimension == 3:
-        axes.set_axis_off()  # a slanted view has no scale
-    return shown
+    extent = [factor * e for e in (run.lower[0], run.upper[0], run.lower[1], run.upper[1])]
+    axes.imshow(picture, origin="lower", extent=extent, interpolation="antialiased")
+    axes.set_title("\n".join(textwrap.wrap(title, 80)), fontsize=10, color="firebrick" if run.failed else "black")
+    axes.set_xlabel(f"x [{unit}]")
+    axes.set_ylabel(f"y [{unit}]")
+
+
+def _scale_bar(figure, axes: list, low: float, high: float, name: str, shown: Scalar) -> None:
+    """The colour scale beside pictures."""
+    factor, unit = prefixed(max(abs(low), abs(high)), shown.unit)
+    norm = matplotlib.colors.Normalize(low * factor, high * factor)
+    colour_map = matplotlib.colors.ListedColormap(colours.MAPS[name])
+    bar = figure.colorbar(matplotlib.cm.ScalarMappable(norm, colour_map), ax=axes, shrink=0.75, pad=0.02, extend="max")
+    bar.set_label(f"{shown.title} [{unit}]" if unit else shown.title)
 
 
 def _save(figure, folder: Path, name: str) -> str:
@@ -80,9 +106,24 @@ def _save(figure, folder: Path, name: str) -> str:
 
 
 def _draw_grains(run: Run, frame: Frame, folder: Path, name: str) -> str:
-    picture, extent = grain_picture(run, frame)
+    if run.dimension == 3:
+        Scene(run, replace(run.look, colour="body"), [frame]).sheet(frame, _title(run, frame)).image.save(folder / name)
+        return name
     figure, axes = plt.subplots(figsize=(7, 7))
-    _show(axes, run, picture, extent, f"{run.title}, {label(run, frame)}")
+    _show(axes, run, grain_picture(run, frame), _title(run, frame))
+    return _save(figure, folder, name)
+
+
+def _draw_pair(pair: list[tuple[Run, Frame]], folder: Path, name: str) -> str:
+    """Two runs side by side."""
+    if pair[0][0].dimension == pair[1][0].dimension == 3:
+        sheets = [Scene(run, replace(run.look, colour="body"), [frame]).sheet(frame, _title(run, frame)).image
+                  for run, frame in pair]
+        beside(sheets).save(folder / name)
+        return name
+    figure, row = plt.subplots(1, 2, figsize=(14, 7))
+    for axes, (run, frame) in zip(row, pair):
+        _show(axes, run, grain_picture(run, frame), _title(run, frame))
     return _save(figure, folder, name)
 
 
@@ -120,15 +161,13 @@ def grains_later(run: Run, other: Run | None, folder: Path, summary: dict) -> li
         raise MissingData(f"{other.folder} has no particles_*.vtkhdf files to compare with")
     other_frame = min(other.frames, key=lambda candidate: abs(candidate.time - frame.time))
     made.append(_draw_grains(other, other_frame, folder, f"{name}_{other.folder.name}.png"))
-    figure, pair = plt.subplots(1, 2, figsize=(14, 7))
-    for axes, (shown, at) in zip(pair, ((other, other_frame), (run, frame))):
-        _show(axes, shown, *grain_picture(shown, at), f"{shown.title}, {label(shown, at)}")
-    made.append(_save(figure, folder, f"{name}_compare.png"))
+    if run.dimension == other.dimension:
+        made.append(_draw_pair([(other, other_frame), (run, frame)], folder, f"{name}_compare.png"))
     return made
 
 
 def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
-    """In-plane principal stress difference, white where large, at 63 % and 71 % shear (Fig. 7) on one scale.
+    """In-plane principal stress difference, bright where large, at 63 % and 71 % shear (Fig. 7) on one scale.
 
     Runs that are not a shear, or end sooner: at the end.
     """
@@ -141,19 +180,84 @@ def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -
         frames = [run.frames[-1]]
     if any(frame.points == 0 for frame in frames):
         raise MissingData("there are no points any more")
-    values = [principal_stress_difference(run.stress(frame)) for frame in frames]
+    shown = SCALARS["difference"]
+    values = [shown.values(run, frame) for frame in frames]
     top = max(float(np.percentile(value, 99)) for value in values)
+    scale = (0.0, top if top > 0 else 1.0, "stress")
     figure, row = plt.subplots(1, len(frames), figsize=(7 * len(frames), 7), squeeze=False)
-    extent = (run.lower[0], run.upper[0], run.lower[1], run.upper[1])
     for axes, frame, value in zip(row[0], frames, values):
-        picture = raster.paint_values(owners(run, frame), value, top) * top
-        shown = _show(axes, run, picture, extent, f"{run.title}, {label(run, frame)}", cmap="gray", vmin=0,
-                      vmax=top if top > 0 else 1)
-    bar = figure.colorbar(shown, ax=list(row[0]), shrink=0.75, pad=0.02)
-    bar.set_label("principal stress difference [Pa]")
+        _show(axes, run, value_picture(run, frame, value, scale), _title(run, frame))
+    _scale_bar(figure, list(row[0]), *scale, shown)
     summary["principal_stress_scale_Pa"] = top
     summary["principal_stress_field"] = run.stress_name(frames[0])
     return [_save(figure, folder, "principal_stress.png")]
+
+
+def stress_inside(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
+    """Von Mises stress at the end, with bodies cut open through the middle (3D), or where --clip says."""
+    frame = run.frames[-1] if run.frames else _first_frame(run)
+    if run.dimension != 3:
+        raise MissingData("drawn for three dimensions only")
+    if not run.has_stress(frame):
+        raise MissingData(f"{frame.path.name} holds no stress (see output.particles.fields)")
+    look = replace(run.look, colour="mises", range=None, planes=run.look.planes or [middle_plane(run)])
+    Scene(run, look, [frame]).sheet(frame, _title(run, frame)).image.save(folder / "stress_inside.png")
+    return ["stress_inside.png"]
+
+
+def force_chains(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
+    """The contacts over the bodies, lines as wide as forces are large, at the last time at which anything touches."""
+    contacts, frame = loaded(run)
+    net = network(run, contacts, frame)
+    summary["contacts"] = {"time_s": contacts.time, "count": net.contacts, "mean_force_N": net.mean}
+    if run.dimension == 3:
+        scene = Scene(run, replace(run.look, colour="body"), [frame])
+        scene.with_chains(frame, net, _title(run, frame)).image.save(folder / "force_chains.png")
+        return ["force_chains.png"]
+    figure, axes = plt.subplots(figsize=(7, 7))
+    pale = 255 - (255 - grain_picture(run, frame)) * 0.35
+    _show(axes, run, pale.astype(np.uint8), _title(run, frame))
+    factor, _ = length_unit(run)
+    figure.canvas.draw()
+    per_metre = axes.get_window_extent().width / (run.upper - run.lower)[0] * 72 / figure.dpi  # points
+    order = np.argsort(net.force)
+    widths = np.maximum(widest(run) * net.share * per_metre, 0.4)[order]
+    drawn = LineCollection(factor * net.lines[order, :, :2], linewidths=widths, capstyle="round",
+                           colors=np.where(net.strong[:, None], STRONG, WEAK)[order])
+    axes.add_collection(drawn, autolim=False)
+    factor, unit = prefixed(net.top, "N/m")
+    mean, top = (f"{force * factor:.3g} {unit}" for force in (net.mean, net.top))
+    axes.plot([], [], color=STRONG, lw=3, label=f"{mean} (mean) to {top} (widest)")
+    axes.plot([], [], color=WEAK, lw=1, label="weaker than the mean")
+    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, frameon=False,
+                title=net.title, title_fontsize=8)
+    return [_save(figure, folder, "force_chains.png")]
+
+
+def values(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
+    """The value of --colour, at the --times or at the end, on one scale."""
+    frames = list(dict.fromkeys(nearest_frames(run, run.look.times))) if run.look.times else [*run.frames[-1:]]
+    if not frames:
+        _first_frame(run)
+    if any(frame.points == 0 for frame in frames):
+        raise MissingData("there are no points any more")
+    name = "bodies" if run.look.colour == "body" else run.look.colour
+    names = [f"{name}.png" if len(frames) == 1 else f"{name}_{frame.step:06d}.png" for frame in frames]
+    if run.dimension == 3:
+        scene = Scene(run, run.look, frames)
+        for frame, name in zip(frames, names):
+            scene.sheet(frame, _title(run, frame)).image.save(folder / name)
+        return names
+    if run.look.colour == "body":
+        return [_draw_grains(run, frame, folder, name) for frame, name in zip(frames, names)]
+    shown = scalar(run, frames[0], run.look.colour)
+    scale = scale_of(run, frames, shown, run.look.range)
+    for frame, name in zip(frames, names):
+        figure, axes = plt.subplots(figsize=(8, 7))
+        _show(axes, run, value_picture(run, frame, shown.values(run, frame), scale), _title(run, frame))
+        _scale_bar(figure, [axes], *scale, shown)
+        _save(figure, folder, name)
+    return names
 
 
 def column_profile(run: Run, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
@@ -279,4 +383,5 @@ def _compare_plastic_work(run: Run, other: Run | None, summary: dict) -> None:
         summary["plastic_work_ratio_to_this_run"] = {other.folder.name: work[1] / work[0]}
 
 
-FIGURES = (grains_start, grains_later, principal_stress, displacement_profile, energy, *laboratory.FIGURES)
+FIGURES = (grains_start, grains_later, principal_stress, stress_inside, force_chains, displacement_profile, energy,
+           *laboratory.FIGURES)

@@ -1,21 +1,29 @@
-"""A film of a run: bodies, and beside them the principal stress difference (2D)."""
+"""A film of a run: bodies, and beside them the principal stress difference (2D), or bodies in space."""
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image
 
-import raster
-from figures import grain_picture, label, owners
-from results import MissingData, Run, principal_stress_difference
+import colours
+from canvas import Sheet, beside
+from figures import grain_picture, label, value_picture
+from results import Frame, MissingData, Run
+from scalars import SCALARS, scalar, scale
+from space import Scene
 
-PIXELS = 480
+PIXELS = 480  # of each of two pictures of the domain; a single one has half as many again
 FRAMES_PER_SECOND = 12
-CAPTION = 20  # height of the line of text [pixels]
+BAR = 30  # width of the progress bar, in letters
 
 
 def film(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
@@ -24,38 +32,88 @@ def film(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
         raise MissingData("a film needs two or more particles_*.vtkhdf files")
     if any(frame.points == 0 for frame in run.frames):
         raise MissingData("a particles_*.vtkhdf file holds no points")
-    pictures = list(_pictures(run))
+    pictures = progress(drawn(_drawer(run), run.frames), len(run.frames))
     ffmpeg = shutil.which("ffmpeg")
-    if ffmpeg:
-        height, width, _ = pictures[0].shape
-        command = [ffmpeg, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-                   "-r", str(FRAMES_PER_SECOND), "-i", "-", "-pix_fmt", "yuv420p", str(folder / "film.mp4")]
-        subprocess.run(command, input=b"".join(picture.tobytes() for picture in pictures), check=True)
-        return ["film.mp4"]
+    return [_mp4(ffmpeg, pictures, folder / "film.mp4") if ffmpeg else _gif(pictures, folder / "film.gif")]
+
+
+def _drawer(run: Run) -> Callable[[Frame], Image.Image]:
+    """What draws a frame; all frames have one camera, and one scale."""
+    if run.dimension == 3:
+        scene = Scene(run, run.look, run.frames)
+        return lambda frame: scene.sheet(frame, f"{run.title}   {label(run, frame)}").image
+    colour, panels = colours.of_run(run), []
+    if run.look.colour != "body":
+        panels = [scalar(run, run.frames[0], run.look.colour)]
+        pixels = PIXELS * 3 // 2
+    elif all(run.has_stress(frame) for frame in run.frames):
+        panels, pixels = [None, SCALARS["difference"]], PIXELS
+    else:
+        panels, pixels = [None], PIXELS * 3 // 2
+    scales = [shown and scale(run, run.frames, shown, run.look.range) for shown in panels]
+    scales = [ends and (*ends[:2], "stress" if shown is SCALARS["difference"] else ends[2])
+              for ends, shown in zip(scales, panels)]
+
+    def draw(frame: Frame) -> Image.Image:
+        row = []
+        for shown, ends in zip(panels, scales):
+            picture = (value_picture(run, frame, shown.values(run, frame), ends, pixels) if shown
+                       else grain_picture(run, frame, pixels, colour))
+            title = shown.title if shown and row else f"{run.title}   {label(run, frame)}"
+            sheet = Sheet(picture[::-1] / 255.0, title, run.failed, scale=shown is not None)
+            if shown:
+                sheet.colour_scale(*ends, shown.title, shown.unit)
+            row.append(sheet.image)
+        return beside(row)
+
+    return draw
+
+
+_draw: Callable[[Frame], Image.Image]  # of the worker processes, which are forks
+
+
+def _picture(frame: Frame) -> np.ndarray:
+    """A frame as an array (rows x columns x 3) with even sides, which films want."""
+    picture = np.asarray(_draw(frame))
+    return np.ascontiguousarray(picture[: picture.shape[0] // 2 * 2, : picture.shape[1] // 2 * 2])
+
+
+def drawn(draw: Callable[[Frame], Image.Image], frames: list[Frame]) -> Iterator[np.ndarray]:
+    """The pictures in order, drawn on all cores."""
+    global _draw
+    _draw = draw
+    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), get_context("fork")) as pool:
+        yield from pool.map(_picture, frames)
+
+
+def progress(items: Iterable, count: int) -> Iterator:
+    """Shows on a terminal how many of the items are there."""
+    shown = sys.stderr.isatty()
+    for k, item in enumerate(items, 1):
+        yield item
+        if shown:
+            done = BAR * k // count
+            print(f"\r  film [{'#' * done}{'.' * (BAR - done)}] {k}/{count}", end="\n" if k == count else "",
+                  file=sys.stderr, flush=True)
+
+
+def _mp4(ffmpeg: str, pictures: Iterator[np.ndarray], path: Path) -> str:
+    first = next(pictures)
+    height, width, _ = first.shape
+    command = [ffmpeg, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+               "-r", str(FRAMES_PER_SECOND), "-i", "-", "-pix_fmt", "yuv420p", str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        process.stdin.write(first.tobytes())
+        for picture in pictures:
+            process.stdin.write(picture.tobytes())
+        process.stdin.close()
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)
+    return path.name
+
+
+def _gif(pictures: Iterator[np.ndarray], path: Path) -> str:
     images = [Image.fromarray(picture).quantize(128) for picture in pictures]
     duration = 1000 // FRAMES_PER_SECOND  # [ms]
-    images[0].save(folder / "film.gif", save_all=True, append_images=images[1:], duration=duration, loop=0)
-    return ["film.gif"]
-
-
-def _pictures(run: Run):
-    """Each frame as an array (rows from the top x columns x 3) with even sides."""
-    stressed = run.dimension == 2 and all(frame.has(run.stress_name(frame)) for frame in run.frames)
-    top = _stress_scale(run) if stressed else 0
-    for frame in run.frames:
-        panels = [grain_picture(run, frame, PIXELS)[0]]
-        if stressed:
-            value = principal_stress_difference(run.stress(frame))
-            grey = (255 * raster.paint_values(owners(run, frame, PIXELS), value, top)).astype(np.uint8)
-            panels.append(np.repeat(grey[..., None], 3, axis=2))
-        picture = np.concatenate(panels, axis=1)[::-1]
-        rows, columns = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2
-        canvas = Image.new("RGB", (columns, rows + CAPTION))
-        canvas.paste(Image.fromarray(np.ascontiguousarray(picture[:rows, :columns])), (0, CAPTION))
-        ImageDraw.Draw(canvas).text((6, 4), f"{run.title}   {label(run, frame)}", fill=(255, 255, 255))
-        yield np.asarray(canvas)
-
-
-def _stress_scale(run: Run) -> float:
-    """One scale for the whole film [Pa]: the largest 99th percentile of any frame."""
-    return max(float(np.percentile(principal_stress_difference(run.stress(frame)), 99)) for frame in run.frames)
+    images[0].save(path, save_all=True, append_images=images[1:], duration=duration, loop=0)
+    return path.name

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
-from figures import FIGURES
-from results import Damaged, Frame, MissingData, Run
+from command import folder_in, run_command
+from figures import FIGURES, values
+from look import Look
+from results import Frame, MissingData, Run
+from scalars import SCALARS
+from space import clip_plane
 
 PICTURES = """pictures:
   grains_start.png          bodies at the start
   grains_75.png             bodies at 75 % shear (shear runs); grains_end.png: at the end
-  principal_stress.png      principal stress difference: force chains
+  principal_stress.png      principal stress difference: force chains (2D)
+  stress_inside.png         von Mises stress in bodies that are cut open (3D)
   displacement_profile.png  average displacement across the sheared layer, and the shear band
   energy.png                the energy book
   force_displacement.png    force on tools that move (forces.csv)
@@ -39,22 +44,44 @@ def arguments() -> argparse.Namespace:
                         help="fringe parameter [Pa] of a photoelastic picture: a fringe for each 2 pi of it in the "
                         "difference of the in-plane principal stresses; a tenth of the largest stress is a start")
     parser.add_argument("--times", type=float, nargs="+", default=[], metavar="S",
-                        help="with --fringes: the outputs nearest to these times [s]; default: all")
+                        help="with --fringes or --colour: the outputs nearest to these times [s]; default: all, or the last")
     parser.add_argument("--raw-stress", action="store_true",
                         help="show the points' stress as computed, also where the files hold the smooth field "
                         "(stress_smooth), which pictures show otherwise")
+    space = parser.add_argument_group("what is shown, and from where")
+    space.add_argument("--colour", default="body", metavar="VALUE",
+                       help="draw VALUE.png, and the film, in colours of a value: " + ", ".join(SCALARS) +
+                       ", or any field of the files with one component")
+    space.add_argument("--range", type=float, nargs=2, metavar=("LOW", "HIGH"),
+                       help="ends of its colour scale, in SI units")
+    space.add_argument("--clip", action="append", default=[], metavar="KEPT",
+                       help="3D: cut bodies open and keep what is there, as x<0.3 (metres), or x< for half; up to 3 times")
+    space.add_argument("--azimuth", type=float,
+                       help="3D: degrees about the vertical axis; default: 35, or so that cuts are seen")
+    space.add_argument("--elevation", type=float, help="3D: degrees above the horizon (22)")
+    space.add_argument("--zoom", type=float, default=1.0, help="3D: 2 shows half the width")
+    space.add_argument("--perspective", action="store_true", help="3D: what is near looks larger")
+    space.add_argument("--size", type=int, nargs=2, default=(900, 700), metavar=("WIDTH", "HEIGHT"),
+                       help="3D: pixels (900 700)")
     return parser.parse_args()
 
 
-def pictures_of(run: Run) -> Path:
-    """The folder of the pictures, made where it is missing; it must not lead out of the results."""
-    folder = run.folder / "pictures"
-    if folder.is_symlink():
-        raise Damaged(f"{folder} is a link, which is not followed; remove it")
-    if folder.exists() and not folder.is_dir():
-        raise Damaged(f"{folder} is not a folder; move it away")
-    folder.mkdir(exist_ok=True)
-    return folder
+def look_of(options: argparse.Namespace, run: Run) -> Look:
+    """What the options ask to see."""
+    numbers = [options.azimuth or 0, options.elevation or 0, options.zoom, *(options.range or (0, 1)), *options.times]
+    if not all(map(math.isfinite, numbers)):
+        raise MissingData("a number of the options is not finite")
+    if not 0.01 <= options.zoom <= 1000:
+        raise MissingData(f"--zoom {options.zoom:g}: must be from 0.01 to 1000")
+    if not all(100 <= side <= 10000 for side in options.size):
+        raise MissingData("--size: sides must be from 100 to 10000 pixels")
+    if options.range and options.range[0] >= options.range[1]:
+        raise MissingData("--range: the first must be below the second")
+    planes = [clip_plane(text, run) for text in options.clip]
+    if len(planes) > 3:
+        raise MissingData("--clip: three planes at the most")
+    return Look(options.colour, planes, options.azimuth, options.elevation, options.zoom, options.perspective,
+                options.times, tuple(options.range) if options.range else None, *options.size)
 
 
 def fringes(options: argparse.Namespace) -> int:
@@ -69,7 +96,7 @@ def fringes(options: argparse.Namespace) -> int:
     run.raw_stress = options.raw_stress
     if path.is_file():
         run.frames = [Frame(path)]
-    folder = pictures_of(run)
+    folder = folder_in(run.folder, "pictures")
     with tempfile.TemporaryDirectory(dir=folder, prefix=".") as drafts:
         for name in photoelastic(run, options.fringes, options.times, Path(drafts)):
             os.replace(Path(drafts) / name, folder / name)
@@ -82,7 +109,12 @@ def pictures(options: argparse.Namespace) -> int:
     run = Run(options.run)
     other = Run(options.compare) if options.compare else None
     run.raw_stress = options.raw_stress
+    run.look = look_of(options, run)
+    if other:
+        other.look = run.look
     figures = list(FIGURES)
+    if options.colour != "body" or options.times:
+        figures.append(values)
     if options.film:
         from film import film
 
@@ -94,7 +126,7 @@ def pictures(options: argparse.Namespace) -> int:
 
 def draw(run: Run, other: Run | None, figures: list) -> None:
     """Draws each picture in a folder of its own first, so that what has its final name is whole."""
-    folder = pictures_of(run)
+    folder = folder_in(run.folder, "pictures")
     summary = {"title": run.title, "failed": run.failed}
     with tempfile.TemporaryDirectory(dir=folder, prefix=".") as drafts:
         for figure in figures:
@@ -111,23 +143,8 @@ def draw(run: Run, other: Run | None, figures: list) -> None:
 
 def main() -> int:
     options = arguments()
-    try:
-        return pictures(options) if options.fringes is None else fringes(options)
-    except (MissingData, Damaged) as error:
-        return refuse(str(error), 2)
-    except (OSError, subprocess.CalledProcessError) as error:
-        return refuse(f"cannot write the pictures: {error}", 3)
-    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as error:
-        # Each file can be read, but they are not of one run. CAIRN_TRACEBACK=1 shows where, should it be a fault here.
-        if os.environ.get("CAIRN_TRACEBACK"):
-            raise
-        return refuse(f"{options.run}: the results do not fit together: {type(error).__name__}: {error}", 2)
-
-
-def refuse(text: str, code: int) -> int:
-    """One line of error."""
-    print("plot: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr)
-    return code
+    draw_all = pictures if options.fringes is None else fringes
+    return run_command("plot", options.run, "the pictures", lambda: draw_all(options))
 
 
 if __name__ == "__main__":

@@ -6,120 +6,86 @@ import numpy as np
 
 REACH = 0.80  # of a point, in point spacings: a little more than half the diagonal of its square
 
-# Bright colours that stand apart from each other and from black.
-PALETTE = np.array(
-    [
-        (230, 25, 75), (60, 180, 75), (255, 225, 25), (0, 130, 200), (245, 130, 48), (145, 60, 190),
-        (70, 240, 240), (240, 50, 230), (210, 245, 60), (250, 190, 212), (0, 128, 128), (220, 190, 255),
-        (170, 110, 40), (255, 250, 200), (165, 40, 40), (170, 255, 195), (128, 128, 0), (255, 215, 180),
-        (80, 100, 255), (120, 220, 90),
-    ],
-    np.uint8,
-)  # fmt: skip
-DRIVEN = np.array((120, 120, 120), np.uint8)
-BLACK = np.zeros(3, np.uint8)
+BLEND = 1.4  # likewise, of a point's value
+VOID = np.array((255, 255, 255), np.uint8)
+EMPTY = np.array((205, 212, 220), np.uint8)  # where there is no matter in a picture of values: no colour of a scale
+
+
+class Pixels:
+    """Pixels of the domain, rows upwards as imshow(origin="lower") has them, and the points that reach them."""
+
+    def __init__(self, xy: np.ndarray, spacing: float, lower, upper, periodic, pixels: int):
+        """xy (N x 2), spacing, lower and upper in metres; `pixels` is the length of the longer side."""
+        lower, upper = np.asarray(lower, float), np.asarray(upper, float)
+        size = (upper - lower).max() / pixels
+        self.shape = np.maximum(np.rint((upper - lower) / size).astype(int), 1)
+        place = (xy - lower) / size
+        self._base = np.floor(place).astype(int)
+        self._within = place - self._base - 0.5  # of the point, from the centre of its pixel
+        self._spacing, self._periodic = spacing / size, periodic
+
+    def reached(self, reach: float):
+        """For each offset, the farthest first: rows, columns, points, and their distances in spacings."""
+        reach = max(reach * self._spacing, 0.71)
+        radius = int(np.ceil(reach))
+        offsets = [(i, j) for i in range(-radius, radius + 1) for j in range(-radius, radius + 1)]
+        for i, j in sorted(offsets, key=lambda o: -(o[0] ** 2 + o[1] ** 2)):
+            target = self._base + (i, j)
+            distance = np.hypot(i - self._within[:, 0], j - self._within[:, 1])
+            near = distance <= reach
+            for axis in range(2):
+                if self._periodic[axis]:
+                    target[:, axis] %= self.shape[axis]
+                else:
+                    near &= (target[:, axis] >= 0) & (target[:, axis] < self.shape[axis])
+            chosen = np.flatnonzero(near)
+            yield target[chosen, 1], target[chosen, 0], chosen, distance[chosen] / reach
+
+    def nearest(self) -> np.ndarray:
+        """Index of the point that each pixel shows, -1 where there is none."""
+        owner = np.full(self.shape[::-1], -1, np.int64)
+        for row, column, point, _ in self.reached(REACH):  # nearer points paint over those farther away
+            owner[row, column] = point
+        return owner
+
+    def blended(self, owner: np.ndarray, body: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Mean of the values of points near each pixel, of the body that it shows."""
+        shown = np.where(owner >= 0, body[owner], -1)
+        total, weights = np.zeros(owner.shape), np.zeros(owner.shape)
+        for row, column, point, distance in self.reached(BLEND):
+            weight = (1.0001 - distance**2) ** 2 * (shown[row, column] == body[point])
+            total[row, column] += weight * values[point]
+            weights[row, column] += weight
+        return np.where(weights > 0, total / np.maximum(weights, 1e-300), values[owner] if len(values) else 0)
 
 
 def nearest_point(xy: np.ndarray, spacing: float, lower, upper, periodic, pixels: int) -> np.ndarray:
-    """Index of the point that each pixel shows, -1 where there is none.
-
-    xy (N x 2), spacing, lower and upper in metres; `pixels` is the length of the longer side.
-    Rows run upwards, as imshow(origin="lower") has them.
-    """
-    lower, upper = np.asarray(lower, float), np.asarray(upper, float)
-    size = (upper - lower).max() / pixels
-    shape = np.maximum(np.rint((upper - lower) / size).astype(int), 1)
-    place = (xy - lower) / size
-    base = np.floor(place).astype(int)
-    within = place - base - 0.5  # of the point, from the centre of its pixel
-    reach = max(REACH * spacing / size, 0.71)
-    owner = np.full(shape[::-1], -1, np.int64)
-    radius = int(np.ceil(reach))
-    offsets = [(i, j) for i in range(-radius, radius + 1) for j in range(-radius, radius + 1)]
-    # The farthest offset is painted first, so that nearer points paint over it.
-    for i, j in sorted(offsets, key=lambda o: -(o[0] ** 2 + o[1] ** 2)):
-        target = base + (i, j)
-        near = np.hypot(i - within[:, 0], j - within[:, 1]) <= reach
-        for axis in range(2):
-            if periodic[axis]:
-                target[:, axis] %= shape[axis]
-            else:
-                near &= (target[:, axis] >= 0) & (target[:, axis] < shape[axis])
-        chosen = np.flatnonzero(near)
-        owner[target[chosen, 1], target[chosen, 0]] = chosen
-    return owner
+    """Index of the point that each pixel shows, -1 where there is none."""
+    return Pixels(xy, spacing, lower, upper, periodic, pixels).nearest()
 
 
-def body_colours(bodies: np.ndarray, driven: np.ndarray) -> np.ndarray:
-    """Colour (N x 3, 0 to 255) of each body id: the same for the same id in every picture; driven bodies are grey."""
-    mixed = (np.asarray(bodies).astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
-    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):  # splitmix64: neighbouring ids part
-        mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
-    colours = PALETTE[(mixed >> np.uint64(32)) % np.uint64(len(PALETTE))]
-    colours[np.isin(bodies, driven)] = DRIVEN
-    return colours
-
-
-def paint_bodies(owner: np.ndarray, body: np.ndarray, driven: np.ndarray) -> np.ndarray:
-    """Picture (rows x columns x 3) of bodies in colours on black, with a dark line where two bodies touch."""
-    shown = np.where(owner >= 0, body[owner], -1)
-    picture = body_colours(np.maximum(shown, 0).ravel(), driven).reshape(*owner.shape, 3)
-    picture[shown < 0] = BLACK
+def outlines(shown: np.ndarray) -> np.ndarray:
+    """Where a picture of bodies (rows x columns, -1: none) changes from one to another, or to none."""
     line = np.zeros(shown.shape, bool)
-    line[:, :-1] |= (shown[:, :-1] != shown[:, 1:]) & (shown[:, 1:] >= 0)
-    line[:-1] |= (shown[:-1] != shown[1:]) & (shown[1:] >= 0)
-    picture[line & (shown >= 0)] //= 4
+    line[:, :-1] |= shown[:, :-1] != shown[:, 1:]
+    line[:-1] |= shown[:-1] != shown[1:]
+    return line
+
+
+def paint_bodies(owner: np.ndarray, body: np.ndarray, colour) -> np.ndarray:
+    """Picture (rows x columns x 3) of bodies on white, with a dark line around each; `colour`: of bodies, 0 to 1."""
+    picture = np.broadcast_to(VOID, (*owner.shape, 3)).copy()
+    matter = owner >= 0
+    bodies, which = np.unique(body, return_inverse=True)
+    picture[matter] = (255 * colour(bodies) + 0.5).astype(np.uint8).reshape(-1, 3)[which[owner[matter]]]
+    picture[outlines(np.where(matter, body[owner], -1))] //= 4
     return picture
 
 
-def paint_values(owner: np.ndarray, value: np.ndarray, top: float) -> np.ndarray:
-    """Picture (rows x columns, 0 to 1) of a scalar of the points: white at `top` and above, black where it is zero."""
-    share = np.clip(value / top, 0, 1) if top > 0 else np.zeros(len(value))
-    return np.where(owner >= 0, share[owner], 0.0)
-
-
-def project(position: np.ndarray, up: int) -> tuple[np.ndarray, np.ndarray]:
-    """View of points in space (N x 3) from above one corner, without perspective.
-
-    Returns the place in the picture (N x 2) [m] and the distance towards the viewer (N) [m]. `up` is the vertical axis.
-    """
-    axes = [axis for axis in range(3) if axis != up]
-    turn, tilt = np.radians(30), np.radians(22)
-    a, b, c = position[:, axes[0]], position[:, axes[1]], position[:, up]
-    right = np.cos(turn) * a + np.sin(turn) * b
-    away = -np.sin(turn) * a + np.cos(turn) * b
-    return np.column_stack((right, np.cos(tilt) * c + np.sin(tilt) * away)), np.sin(tilt) * c - np.cos(tilt) * away
-
-
-def paint_space(position: np.ndarray, body: np.ndarray, driven, spacing: float, corners: np.ndarray, up: int,
-                pixels: int) -> tuple[np.ndarray, tuple]:
-    """Picture of bodies in space: the nearest point wins each pixel, colours darken with distance.
-
-    Returns the picture and its extent (left, right, bottom, top) [m]. `corners` (8 x 3) are those of the domain.
-    """
-    frame, _ = project(corners, up)
-    lower, upper = frame.min(axis=0), frame.max(axis=0)
-    xy, towards = project(position, up)
-    order = np.argsort(towards, kind="stable")
-    size = (upper - lower).max() / pixels
-    shape = np.maximum(np.rint((upper - lower) / size).astype(int), 1)
-    base = np.floor((xy[order] - lower) / size).astype(int)
-    radius = max(int(np.ceil(REACH * spacing / size)), 1)
-    depth = np.full(shape[::-1], -np.inf)
-    owner = np.full(shape[::-1], -1, np.int64)
-    for i in range(-radius, radius + 1):
-        for j in range(-radius, radius + 1):
-            if i * i + j * j > radius * radius:
-                continue
-            target = base + (i, j)
-            inside = ((target >= 0) & (target < shape)).all(axis=1)
-            column, row = target[inside, 0], target[inside, 1]
-            candidate = np.full(owner.shape, -1, np.int64)
-            candidate[row, column] = order[inside]  # the last, that is nearest, wins
-            nearness = np.where(candidate >= 0, towards[candidate], -np.inf)
-            better = nearness > depth
-            owner[better], depth[better] = candidate[better], nearness[better]
-    picture = paint_bodies(owner, body, driven)
-    span = max(np.ptp(towards), 1e-300)
-    light = np.where(owner >= 0, 0.35 + 0.65 * (depth - towards.min()) / span, 0)
-    return (picture * light[..., None]).astype(np.uint8), (lower[0], upper[0], lower[1], upper[1])
+def paint_values(owner: np.ndarray, body: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Picture (rows x columns x 3) of the colours of pixels (0 to 1), with a thin line around each body."""
+    matter = owner >= 0
+    picture = np.where(matter[..., None], (255 * colour + 0.5).astype(np.uint8), EMPTY)
+    line = outlines(np.where(matter, body[owner], -1))
+    picture[line] = (0.6 * picture[line]).astype(np.uint8)
+    return picture

@@ -17,6 +17,8 @@ import h5py
 import numpy as np
 
 from bodies import FACES, BodyTable, read_bodies
+from lattice import SPACING_TO_CELL, Lattice
+from look import Look
 
 COMPONENTS = {"position": 3, "velocity": 3, "spin": 3, "image": 3, "stress": 6, "stress_smooth": 6,
               "deformation_gradient": 9,
@@ -75,11 +77,11 @@ class Frame:
             self.step = int(_attribute(group, file, "step"))
             if not np.isfinite(self.time):
                 raise ValueError(f"its time is {self.time}")
-            self._names = set(group["PointData"].keys()) if "PointData" in group else set()
+            self.names = set(group["PointData"].keys()) if "PointData" in group else set()
             self.points = group["Points"].shape[0]
 
     def has(self, name: str) -> bool:
-        return name in self._names or name == "position"
+        return name in self.names or name == "position"
 
     def field(self, name: str) -> np.ndarray:
         """One value or row for each point: position (N x 3) [m], velocity (N x 3) [m/s],
@@ -120,6 +122,7 @@ class Run:
             self.title += " - THE RUN FAILED"
         self.frames = [Frame(path) for path in sorted(self.folder.glob("particles_*.vtkhdf"))]
         self.raw_stress = False  # pictures show the points' stress as computed
+        self.look = Look()
 
     def _read_case(self, case: dict) -> None:
         self.case = case
@@ -153,12 +156,19 @@ class Run:
             return json.loads(record.read_text(encoding="utf-8"))["runs"][-1]["exit_code"] == 3
 
     def stress_name(self, frame: Frame) -> str:
-        """The field of stress that pictures show: the smooth one where the file holds it, and raw is not asked for."""
-        return "stress_smooth" if frame.has("stress_smooth") and not self.raw_stress else "stress"
+        """What stress pictures show: the points' own on request, else the smooth one of the file, or one made here."""
+        if self.raw_stress:
+            return "stress"
+        return "stress_smooth" if frame.has("stress_smooth") else "stress, smoothed"
 
     def stress(self, frame: Frame) -> np.ndarray:
         """Stress to look at (N x 6: xx yy zz xy yz xz) [Pa]."""
-        return frame.field(self.stress_name(frame))
+        name = self.stress_name(frame)
+        return smoothed(self, frame, frame.field("stress")) if name == "stress, smoothed" else frame.field(name)
+
+    def has_stress(self, frame: Frame) -> bool:
+        """Whether there is a stress to look at."""
+        return frame.has("stress") or (frame.has("stress_smooth") and not self.raw_stress)
 
     def _cells(self, domain: dict) -> np.ndarray:
         if "cells" in domain:
@@ -224,6 +234,23 @@ class Run:
         return best
 
     @cached_property
+    def contact_files(self) -> list[Frame]:
+        """Rows for touching pairs: body_a, body_b, point [m], normal, force on a [N], means since the file before."""
+        return [Frame(path) for path in sorted(self.folder.glob("contacts_*.h5"))]
+
+    @cached_property
+    def grain_files(self) -> list[Frame]:
+        """Rows for bodies: body, mass [kg], centre [m], velocity [m/s], angular_velocity, mean_stress [Pa], ..."""
+        return [Frame(path) for path in sorted(self.folder.glob("grains_*.h5"))]
+
+    def file_at(self, files: list[Frame], time: float) -> Frame | None:
+        """The file of that time [s], to a thousandth of the time between particle files; None where there is none."""
+        spaces = np.diff([frame.time for frame in self.frames])
+        near = 1e-3 * spaces.min() if len(spaces) and spaces.min() > 0 else 1e-9
+        best = min(files, key=lambda file: abs(file.time - time), default=None)
+        return best if best is not None and abs(best.time - time) <= max(near, 1e-12 * abs(time)) else None
+
+    @cached_property
     def driven_bodies(self) -> np.ndarray:
         """Ids of the bodies moved as rigid parts: all their points keep one and the same prescribed velocity."""
         last = self.frames[-1]
@@ -260,16 +287,15 @@ class Run:
 
     @cached_property
     def grains(self) -> list[Frame]:
-        """The files with a row for each body."""
-        return self._outputs("grains")
+        """The files with a row for each body; there are some."""
+        return self._outputs("grains", self.grain_files)
 
     @cached_property
     def contacts(self) -> list[Frame]:
-        """The files with a row for each contact."""
-        return self._outputs("contacts")
+        """The files with a row for each contact; there are some."""
+        return self._outputs("contacts", self.contact_files)
 
-    def _outputs(self, name: str) -> list[Frame]:
-        files = [Frame(path) for path in sorted(self.folder.glob(f"{name}_*.h5"))]
+    def _outputs(self, name: str, files: list[Frame]) -> list[Frame]:
         if not files:
             raise MissingData(f"there are no {name}_*.h5 files (see output.{name})")
         return files
@@ -308,6 +334,17 @@ class Run:
 def _varies(velocity) -> bool:
     """A velocity that changes with time: rows of a table, or formulas among its components."""
     return isinstance(velocity, list) and any(isinstance(component, (list, str)) for component in velocity)
+
+
+def smoothed(run: Run, frame: Frame, values: np.ndarray) -> np.ndarray:
+    """Points' values (N x K) as the nodes see them: of each body, the mean over a node's points by volume, and that back
+    at the points. As `stress_smooth` of a run (docs/results.md), but on a lattice of the pictures'."""
+    position = frame.field("position")[:, : run.dimension]
+    body = frame.field("body") if frame.has("body") else np.zeros(frame.points, int)
+    volume = frame.field("volume") if frame.has("volume") else np.ones(frame.points)
+    lattice = Lattice(position, body, SPACING_TO_CELL * run.point_spacing, run.lower, run.upper, run.periodic)
+    nodal = lattice.to_nodes(np.column_stack([values * volume[:, None], volume]))
+    return lattice.to_points(nodal[:, :-1] / np.maximum(nodal[:, -1:], 1e-300))
 
 
 def principal_stress_difference(stress: np.ndarray) -> np.ndarray:

@@ -16,8 +16,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<Tool, 6> all_tools = {{{"plot", "Draw the pictures of a run"},
+constexpr std::array<Tool, 9> all_tools = {{{"plot", "Draw the pictures of a run"},
                                             {"measure", "Measure a run's grains, contacts and stresses"},
+                                            {"view", "Write a run as one page for a browser"},
+                                            {"report", "Write a page about a run"},
+                                            {"export", "Write bodies and contacts for other programs"},
                                             {"compare-runs", "Compare two folders of results bit for bit"},
                                             {"convert-grains", "Make a grain table of another program's output"},
                                             {"convert-labels", "Make bodies of an image or a volume of labels"},

@@ -38,7 +38,7 @@ def main() -> int:
     here.mkdir()
 
     commands = re.findall(r"^  ([a-z][a-z-]*) +[A-Z]", cairn("--help").out, re.MULTILINE)
-    expect(len(commands) == 10, f"commands: {commands}")
+    expect(len(commands) == 13, f"commands: {commands}")
     expect(f"Manual: {prefix}/share/doc/cairn" in cairn("--help").out, cairn("--help").out)
     pages = prefix / "share" / "doc" / "cairn"
     for page in [*(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "LICENSE"]:
@@ -58,6 +58,9 @@ def main() -> int:
         expect(done.code == 0, done.err)
     done = cairn("plot", "two_disks", cwd=here, timeout=300)
     expect(done.code == 0 and (here / "two_disks" / "pictures" / "grains_end.png").is_file(), done.err)
+    for tool, made in (("export", "export/grains.dump"), ("view", "view.html"), ("report", "report.html")):
+        done = cairn(tool, "two_disks", cwd=here, timeout=300)
+        expect(done.code == 0 and (here / "two_disks" / made).is_file(), f"{tool}: {done.err}")
     expect(cairn("compare-runs", "two_disks", "two_disks", cwd=here).code == 0, "compare-runs")
     (here / "rows.txt").write_text("#format x_y_z_r\n0 0 0 1\n")
     expect(cairn("convert-grains", "rows.txt", "-o", "rows.csv", cwd=here).code == 0, "convert-grains")

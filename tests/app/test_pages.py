@@ -19,8 +19,10 @@ from harness import PATIENCE, ROOT, Program, fresh_folder
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md",
          *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page.name != "tutorial.md")]
 SHOWN = re.compile(r"(?:[A-Z_]+=\S+ )*(cairn|mpirun|scripts/\S+|build/\S+|ctest|cmake|git|export)\b.*")
-RUN = {"cairn", "mpirun", "scripts/plot", "scripts/measure", "scripts/compare-runs"}
+RUN = {"cairn", "mpirun", "scripts/plot", "scripts/measure", "scripts/view", "scripts/report", "scripts/export",
+       "scripts/compare-runs"}
 NOT_RUN = {"scripts/quickstart", "scripts/test", "scripts/build", "scripts/bench", "scripts/validate", "scripts/check",
+           "scripts/readme-pictures", "scripts/paraview",
            "ctest", "cmake", "export", "git"}
 # A case for pages that only say case.toml, and results for those that start from some.
 ANY_CASE = {"time": "end = 1e-3\nsteps = 40", "output.checkpoint": "{ every = 10 }"}
@@ -130,7 +132,7 @@ def check_cases(cairn: Program, here: Path) -> list[str]:
 
 def check_table_of_cases() -> list[str]:
     """The README names the cases that are there."""
-    named = set(re.findall(r"`(\w+\.toml)`", (ROOT / "README.md").read_text())) - {"case.toml"}
+    named = set(re.findall(r"`(?:cases/)?(\w+\.toml)`", (ROOT / "README.md").read_text())) - {"case.toml"}
     there = {file.name for file in (ROOT / "cases").glob("*.toml")}
     return [] if named == there else [f"README.md names {sorted(named ^ there)}, or they are not in cases/"]
 

@@ -6,6 +6,7 @@ Uses pvpython, or the vtkmodules of this Python (which open single files only). 
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+
+from harness import ROOT
 
 CASE = """
 title = "Two disks"
@@ -42,6 +45,7 @@ material = "rubber"
 velocity = [-5.0, 0.0]
 [output]
 particles = { interval = 2.0e-4, fields = ["velocity", "stress", "body"] }
+contacts = { interval = 2.0e-4 }
 history = { every = 1 }
 """
 
@@ -151,6 +155,33 @@ def see_with_vtk(files: list[Path]) -> dict:
     return seen
 
 
+def check_script(out: Path, scratch: Path, points: int) -> None:
+    """scripts/paraview loads points, bodies and contacts, draws them without a display, and saves the pipeline."""
+    picture, state = scratch / "paraview.png", scratch / "run.pvsm"
+    command = [ROOT / "scripts" / "paraview", out, "--picture", picture, "--state", state]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"scripts/paraview failed\n{done.stdout}\n{done.stderr}"
+    assert f"points: {points} points" in done.stdout, done.stdout
+    assert "grains: " in done.stdout and "contacts: " in done.stdout, done.stdout
+    assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and picture.stat().st_size > 5000, "no picture was drawn"
+    assert "TableToPoints" in state.read_text(), "the pipeline was not saved"
+
+
+def check_lines(out: Path) -> None:
+    """Contacts as scripts/export writes them are read as lines with their force (VTK)."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader
+
+    subprocess.run([ROOT / "scripts" / "export", out, "--form", "vtp"], check=True, stdout=subprocess.DEVNULL)
+    for path in sorted((out / "export").glob("contacts_*.vtp")):
+        reader = vtkXMLPolyDataReader()
+        reader.SetFileName(str(path))
+        reader.Update()
+        data = reader.GetOutput()
+        lines = data.GetNumberOfLines()
+        assert data.GetNumberOfPoints() == 3 * lines, f"{path.name}: {data.GetNumberOfPoints()} points, {lines} lines"
+        assert lines == 0 or data.GetCellData().GetArray("force").GetNumberOfTuples() == lines, f"{path.name}: no forces"
+
+
 def has_vtk() -> bool:
     try:
         import vtkmodules.vtkIOHDF  # noqa: F401
@@ -176,6 +207,12 @@ def main(cairn: str, scratch: Path):
         assert [s["time"] for s in series] == [e["time"] for e in expected], f"times {[s['time'] for s in series]}"
         for s, e in zip(series, expected):
             compare(f"series at {e['time']} s", s, e)
+        if shutil.which("xvfb-run") or os.environ.get("DISPLAY"):
+            check_script(out, scratch, expected[-1]["points"])
+        else:
+            print("there is neither a display nor xvfb-run (Debian: xvfb, xauth): scripts/paraview was not run")
+    if has_vtk():
+        check_lines(out)
     reader = "ParaView" if pvpython else "VTK"
     print(f"{len(files)} files, {expected[0]['points']} points: seen alike by {reader} and HDF5")
 

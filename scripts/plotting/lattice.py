@@ -1,0 +1,92 @@
+"""Nodes of a regular lattice around material points, each body with its own: sums over points, and means back at them.
+
+Linear (tent) weights. Only nodes beside points exist, so that memory goes with the points, whatever the domain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+SPACING_TO_CELL = 2.0  # side of a lattice cell, in spacings of points
+
+
+class Lattice:
+    """`position` (N x D) [m], `body` (N); `size`: about the side of a cell [m]; periodic directions close upon themselves."""
+
+    def __init__(self, position: np.ndarray, body: np.ndarray, size: float, lower, upper, periodic):
+        dimension = position.shape[1]
+        extent = np.asarray(upper, float) - lower
+        count = np.maximum(np.rint(extent / size), 1).astype(np.int64)
+        self.size = np.where(periodic, extent / count, size)
+        place = (position - lower) / self.size
+        cell = np.floor(place).astype(np.int64)
+        within = place - cell  # 0 to 1 in the cell
+        cell = np.where(periodic, cell % count, cell)
+        least, most = ([function(column, initial=0) for column in cell.T] for function in (np.min, np.max))
+        low = np.where(periodic, 0, least)
+        wide = np.where(periodic, count, np.array(most) - low + 2)
+        cell -= low
+        self.bodies, self.owner = np.unique(body, return_inverse=True)
+        stride = np.concatenate(([1], np.cumprod(wide)))
+        cells, of_point = np.unique(self.owner * stride[-1] + cell @ stride[:-1], return_inverse=True)
+        self._owner, rest = np.divmod(cells, stride[-1])
+        place = (rest[:, None] // stride[:-1]) % wide
+        corners = np.stack(np.meshgrid(*[(0, 1)] * dimension, indexing="ij"), -1).reshape(-1, dimension)
+        keys = np.stack([((place + corner) % wide) @ stride[:-1] for corner in corners], 1)
+        nodes, at = np.unique(self._owner[:, None] * stride[-1] + keys, return_inverse=True)
+        self._keys = nodes % stride[-1]
+        self._node_owner = nodes // stride[-1]
+        self.nodes = len(nodes)
+        self._corners, self._within = corners, within
+        self._node = at.reshape(keys.shape).astype(np.int32)[of_point]  # of each point and corner
+        shares = np.stack([1 - within, within])
+        self._factors = [[shares[corner[d], :, d] for d in range(dimension)] for corner in corners]
+        self._weight = [np.multiply.reduce(factors) for factors in self._factors]
+
+    def to_nodes(self, values: np.ndarray, chosen=slice(None)) -> np.ndarray:
+        """sum_p N_ip value_p, for values (N) or (N x K); `chosen`: of these points only."""
+        columns = values.reshape(len(values), -1).T
+        sums = np.zeros((len(columns), self.nodes))
+        for k, weight in enumerate(self._weight):
+            node, weight = self._node[chosen, k], weight[chosen]
+            for row, column in zip(sums, columns):
+                row += np.bincount(node, weights=weight * column, minlength=self.nodes)
+        return sums.T.reshape(self.nodes, *values.shape[1:])
+
+    def to_points(self, nodal: np.ndarray, chosen=slice(None)) -> np.ndarray:
+        """sum_i N_ip value_i."""
+        found = 0
+        for k, weight in enumerate(self._weight):
+            value, weight = nodal[self._node[chosen, k]], weight[chosen]
+            found = found + (weight[:, None] if value.ndim > 1 else weight) * value
+        return found
+
+    def from_nodes(self, chosen=slice(None)):
+        """For each of the nodes around points: N_ip, the node, and the points' places from it (N x D) [m]."""
+        for k, (corner, weight) in enumerate(zip(self._corners, self._weight)):
+            yield weight[chosen], self._node[chosen, k], (self._within[chosen] - corner) * self.size
+
+    def gradient(self, nodal: np.ndarray, chosen=slice(None)) -> np.ndarray:
+        """sum_i grad N_ip value_i (N x D) [1/m], for nodal values (nodes)."""
+        dimension = len(self.size)
+        found = []
+        for d in range(dimension):
+            total = 0
+            for k, factors in enumerate(self._factors):
+                value = nodal[self._node[chosen, k]] * (2 * self._corners[k][d] - 1)
+                for e in range(dimension):
+                    value = value * factors[e][chosen] if e != d else value
+                total = total + value
+            found.append(total / self.size[d])
+        return np.stack(found, 1)
+
+    def neighbours(self) -> np.ndarray:
+        """Pairs of bodies (K x 2) that share a node: those that touch, or nearly."""
+        order = np.argsort(self._keys, kind="stable")
+        key, owner = self._keys[order], self._node_owner[order]
+        pairs = []
+        for apart in range(1, 5):  # more than five bodies at a node are rare
+            same = key[apart:] == key[:-apart]
+            pairs.append(np.stack([owner[:-apart][same], owner[apart:][same]], 1))
+        pairs = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+        return self.bodies[pairs]

@@ -1,0 +1,148 @@
+"""Light on what a z-buffer holds: diffuse light with soft shadows, ambient light that crevices lack, dark silhouettes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from camera import Camera
+from zbuffer import Buffers
+
+LIGHT = np.array((-0.38, 0.58, 0.72)) / np.linalg.norm((-0.38, 0.58, 0.72))  # towards the light, camera axes
+AMBIENT, DIFFUSE, GLOSS = 0.52, 0.55, 0.10
+SHADOW = 0.55  # of the diffuse light, taken by a full shadow
+CREVICE = 0.75  # of the ambient light, taken where nothing of the sky is seen
+LINE = 0.45  # brightness of silhouettes
+TURN = 2.399963  # the golden angle: directions spread evenly however many there are
+RING = [(np.cos(TURN * k), np.sin(TURN * k), (k + 1) / 12) for k in range(12)]  # and the share of the reach there
+
+
+def box_blur(picture: np.ndarray, radius: int) -> np.ndarray:
+    """Mean over squares of 2 radius + 1 pixels, of a picture (rows x columns); twice, which is nearly round."""
+    for _ in range(2):
+        for axis in (0, 1):
+            wide = [(radius + 1, radius) if a == axis else (0, 0) for a in (0, 1)]
+            sums = np.pad(picture, wide, mode="edge").cumsum(axis=axis)
+            n, size = 2 * radius + 1, picture.shape[axis]
+            upper, lower = np.take(sums, range(n, n + size), axis), np.take(sums, range(size), axis)
+            picture = (upper - lower) / n
+    return picture
+
+
+def crevices(buffers: Buffers, camera: Camera, reach: float, blur: int) -> np.ndarray:
+    """Share of the sky (0 to 1) that matter within `reach` [m] hides, for each pixel."""
+    hidden = np.zeros(buffers.depth.shape)
+    depth = np.where(buffers.hit, buffers.depth, -1e30)
+    rows, columns = depth.shape
+    slope = -buffers.normal[..., :2] / np.maximum(buffers.normal[..., 2:], 0.25)
+    for right, up, share in RING:
+        far = reach * share
+        j, i = int(round(far * right * camera.scale)), int(round(-far * up * camera.scale))
+        if not (i or j) or abs(i) >= rows or abs(j) >= columns:
+            continue
+        here = (slice(max(0, -i), rows - max(0, i)), slice(max(0, -j), columns - max(0, j)))
+        there = (slice(max(0, i), rows - max(0, -i)), slice(max(0, j), columns - max(0, -j)))
+        level = depth[here] + far * (right * slope[here][..., 0] + up * slope[here][..., 1])
+        rise = (depth[there] - level) / far
+        hidden[here] += np.clip(rise - 0.15, 0, 1) * np.clip(3 - rise, 0, 1)
+    return np.clip(box_blur(hidden / (0.4 * len(RING)), blur), 0, 1)
+
+
+class Shadows:
+    """What lies in the shadow of the surface, with soft edges."""
+
+    def __init__(self, position: np.ndarray, normal: np.ndarray, radius: float):
+        """`position` (N x 3) [m] and `normal` of all surfels, in camera axes."""
+        position = position[normal @ LIGHT > -0.05]
+        side = np.cross(LIGHT, (0.0, 1.0, 0.0))
+        self.basis = np.stack([side / np.linalg.norm(side), np.cross(side / np.linalg.norm(side), LIGHT), LIGHT])
+        self.radius = radius
+        self.tile = 0.7 * radius
+        turned = position @ self.basis.T
+        self.low = turned[:, :2].min(axis=0) - 3 * radius if len(turned) else np.zeros(2)
+        place = np.floor((turned[:, :2] - self.low) / self.tile).astype(int)
+        shape = place.max(axis=0, initial=0) + 5
+        self.map = np.full(shape, -np.inf)
+        order = np.argsort(turned[:, 2], kind="stable")
+        for i in (-1, 0, 1):
+            for j in (-1, 0, 1):
+                if i and j:
+                    continue
+                tiles = np.full(shape, -np.inf)
+                tiles[place[order, 0] + i, place[order, 1] + j] = turned[order, 2] - (0.3 * radius if i or j else 0)
+                np.maximum(self.map, tiles, out=self.map)
+
+    def share(self, position: np.ndarray) -> np.ndarray:
+        """How much (0 to 1) of the light is kept from positions (N x 3) in camera axes."""
+        turned = position @ self.basis.T
+        place = (turned[:, :2] - self.low) / self.tile
+        limit = turned[:, 2] + 2.2 * self.radius
+        total = np.zeros(len(position))
+        offsets = (-1.2, -0.4, 0.4, 1.2)
+        for a in offsets:
+            for b in offsets:
+                i = np.clip((place[:, 0] + a).astype(np.int32), 0, self.map.shape[0] - 1)
+                j = np.clip((place[:, 1] + b).astype(np.int32), 0, self.map.shape[1] - 1)
+                total += self.map[i, j] > limit
+        return total / len(offsets) ** 2
+
+
+def silhouettes(buffers: Buffers, owner: np.ndarray, step: float) -> np.ndarray:
+    """Darkness (0 to 1) of lines between bodies, against the background, and where depth jumps by `step` [m]."""
+    shown = np.where(buffers.hit, owner[buffers.surfel], -1)
+    depth = np.where(buffers.hit, buffers.depth, -1e30)
+    steep = step / np.maximum(buffers.normal[..., 2], 0.15)  # a slope is no jump
+    line = np.zeros(shown.shape)
+    for axis in (0, 1):
+        near = (slice(None, -1), slice(None)) if axis == 0 else (slice(None), slice(None, -1))
+        far = (slice(1, None), slice(None)) if axis == 0 else (slice(None), slice(1, None))
+        allowed = np.maximum(steep[near], steep[far])
+        edge = (shown[near] != shown[far]) | (np.abs(depth[near] - depth[far]) > allowed)
+        line[near] = np.maximum(line[near], edge & buffers.hit[near])
+        line[far] = np.maximum(line[far], edge & buffers.hit[far] & ~buffers.hit[near])
+    return line
+
+
+def shade(buffers: Buffers, camera: Camera, colour: np.ndarray, cut: np.ndarray, shadows: Shadows, line: np.ndarray,
+          radius: float, grain: float, exact: bool) -> np.ndarray:
+    """Picture (rows x columns x 3, 0 to 1) from the colour of each pixel and the silhouettes (`line`); `grain` [m]: how
+    far crevices reach.
+
+    `exact`: colours are values, to be read against a scale, so that light changes them little and cut faces not at all.
+    """
+    hit = buffers.hit
+    row, column = np.nonzero(hit)
+    normal, surfel = buffers.normal[hit], buffers.surfel[hit]
+    position = camera.unproject(column + 0.5, row + 0.5, buffers.depth[hit])
+    bright = np.clip(normal @ LIGHT, 0, 1)
+    blur = int(np.clip(0.4 * radius * camera.scale, 1, 6))
+    shadow = np.zeros(hit.shape)
+    shadow[hit] = shadows.share(position + normal * radius)
+    shadow = box_blur(shadow, blur)[hit]
+    hidden = crevices(buffers, camera, grain, blur)[hit]
+    light = AMBIENT * (0.8 + 0.2 * normal[:, 1]) * (1 - CREVICE * hidden) + DIFFUSE * bright * (1 - SHADOW * shadow)
+    gloss = GLOSS * np.clip(normal @ _halfway(), 0, 1) ** 40 * (1 - shadow)
+    if exact:
+        light, gloss = 0.35 + 0.65 * light, 0
+        light = np.where(cut[surfel], 1.0, light)
+    picture = np.ones((*hit.shape, 3))
+    picture[hit] = np.clip(colour[hit] * light[:, None] + np.reshape(gloss, (-1, 1)), 0, 1)
+    return soften(picture * (1 - (1 - LINE) * line)[..., None], line)
+
+
+def _halfway() -> np.ndarray:
+    half = LIGHT + (0.0, 0.0, 1.0)
+    return half / np.linalg.norm(half)
+
+
+def soften(picture: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Blends pixels at lines with their neighbours, so that lines are no stairs."""
+    rows, columns = line.shape
+    wide = np.pad(line, 1, mode="edge")
+    near = np.max([wide[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=0) > 0
+    around = np.pad(picture, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    weights = np.outer((1, 2, 1), (1, 2, 1)) / 16
+    row, column = np.nonzero(near)
+    mean = sum(weights[i, j] * around[row + i, column + j] for i in range(3) for j in range(3))
+    softened = picture.copy()
+    softened[row, column] = mean
+    return softened
