@@ -62,9 +62,9 @@ void report(const SurfaceFaults& faults, const std::string& which, const Mesh& m
         fmt::format("{}: {}: its normals point inwards; it was turned", table.where("file").text(), which));
 }
 
-std::string name_of(const SolidPart& part, std::size_t number) {
-  return part.name.empty() ? fmt::format("solid {}", number)
-                           : fmt::format("solid {} ({})", in_quotes(part.name), part.place);
+std::string name_of(const std::string& file, const SolidPart& part, std::size_t number) {
+  return part.name.empty() ? fmt::format("{}: solid #{}", file, number)
+                           : fmt::format("{}: solid {} ({})", file, in_quotes(part.name), part.place);
 }
 
 /// Those of `names` that are asked for: all, the ones of this name, or "#N", the one with this number.
@@ -96,15 +96,15 @@ std::shared_ptr<const Solid> make_solid(const std::vector<SolidPart>& parts, con
   for (const std::size_t i : chosen(names_of(parts), mesh.solid, "solid", table)) {
     Triangles part = parts[i].triangles;
     if (part.corners.empty()) {
-      table.error("file", fmt::format("{} holds no triangles", name_of(parts[i], i)));
+      table.error("file", fmt::format("{} holds no triangles", name_of(mesh.file.name, parts[i], i)));
       continue;
     }
     const SurfaceFaults faults = mend(part);
     if (part.corners.empty()) {
-      table.error("file", fmt::format("{} holds no triangle with an area", name_of(parts[i], i)));
+      table.error("file", fmt::format("{} holds no triangle with an area", name_of(mesh.file.name, parts[i], i)));
       continue;
     }
-    report(faults, name_of(parts[i], i), mesh, table, draft);
+    report(faults, name_of(mesh.file.name, parts[i], i), mesh, table, draft);
     closed = closed && faults.open_edges == 0;
     const auto first = static_cast<std::int32_t>(all.points.size());
     all.points.insert(all.points.end(), part.points.begin(), part.points.end());
@@ -112,12 +112,12 @@ std::shared_ptr<const Solid> make_solid(const std::vector<SolidPart>& parts, con
   }
   if (table.error_count() != before) return nullptr;
   if (all.corners.empty()) {
-    table.error("file", "holds no solid");
+    table.error("file", mesh.file.name + " holds no solid");
     return nullptr;
   }
   auto solid = std::make_shared<Solid>(std::move(all), closed);
   if (!(solid->volume() > 0)) {
-    table.error("file", fmt::format("encloses a volume of {:.3g}; it must be above 0", solid->volume()));
+    table.error("file", fmt::format("{} encloses a volume of {:.3g}; it must be above 0", mesh.file.name, solid->volume()));
     return nullptr;
   }
   return solid;
