@@ -28,7 +28,11 @@ bool share_a_face(const Index<Dim>& a, const Index<Dim>& b) {
 bool is_round(const Shape& shape) {
   if (const auto* compound = std::get_if<Compound>(&shape))
     return std::all_of(compound->of.begin(), compound->of.end(), is_round);
-  return std::visit([](const auto& s) { return requires { s.round; }; }, shape);
+  return std::visit(
+      [](const auto& s) {
+        return requires { s.round; };
+      },
+      shape);
 }
 
 template <int Dim>

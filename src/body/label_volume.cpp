@@ -63,7 +63,8 @@ std::size_t largest(const std::vector<float>& weighted, std::size_t labels, cons
 }  // namespace
 
 std::size_t LabelVolume::Block::bytes() const {
-  return sizeof(Block) + sole.size() * sizeof(std::int32_t) + (weighted.empty() ? 0 : weighted[0].size()) * sizeof(float);
+  return sizeof(Block) + sole.size() * sizeof(std::int32_t) +
+         (weighted.empty() ? 0 : weighted[0].size()) * sizeof(float);
 }
 
 LabelVolume::LabelVolume(int dimension, const std::array<std::int64_t, 3>& size, const Vec3& corner,
@@ -108,7 +109,9 @@ std::vector<std::int32_t> LabelVolume::read_around(const Key& key, std::array<st
   voxels.reserve(static_cast<std::size_t>(size[0] * size[1] * size[2]));
   std::int64_t label = 0;
   std::int32_t index = -1;
-  const auto at = [&](int k, std::int64_t i) { return std::clamp(first[k] + i, lower[k], lower[k] + count[k] - 1) - lower[k]; };
+  const auto at = [&](int k, std::int64_t i) {
+    return std::clamp(first[k] + i, lower[k], lower[k] + count[k] - 1) - lower[k];
+  };
   for (std::int64_t z = 0; z < size[2]; ++z)
     for (std::int64_t y = 0; y < size[1]; ++y)
       for (std::int64_t x = 0; x < size[0]; ++x) {
@@ -145,7 +148,8 @@ LabelVolume::Block LabelVolume::make_block(const Key& key) const {
   Block block;
   std::array<std::int64_t, 3> size{};
   std::vector<std::int32_t> voxels = read_around(key, size);
-  for (int k = 0; k < 3; ++k) block.nodes[k] = static_cast<int>(std::min<std::int64_t>(side + 1, size_[k] - key[k] * side));
+  for (int k = 0; k < 3; ++k)
+    block.nodes[k] = static_cast<int>(std::min<std::int64_t>(side + 1, size_[k] - key[k] * side));
   for (const std::int32_t v : voxels)
     if (block.labels.empty() || (v != block.labels.back() && std::ranges::find(block.labels, v) == block.labels.end()))
       block.labels.push_back(v);

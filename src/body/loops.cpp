@@ -54,9 +54,9 @@ void Loops::measure() {
       area += part, own += part / 3 * (a + b);
     } while (edges_[end++].next != first);
     // Whether the loop's left side is filled, beside its longest edge.
-    const auto longest = std::max_element(edges_.begin() + first, edges_.begin() + end, [](const auto& a, const auto& b) {
-      return (a.to - a.from).squaredNorm() < (b.to - b.from).squaredNorm();
-    });
+    const auto longest = std::max_element(
+        edges_.begin() + first, edges_.begin() + end,
+        [](const auto& a, const auto& b) { return (a.to - a.from).squaredNorm() < (b.to - b.from).squaredNorm(); });
     const Vec3 along = longest->to - longest->from;
     const Vec3 left = 0.5 * (longest->from + longest->to) + 1e-6 * Vec3(-along.y(), along.x(), 0);
     const double sign = holds(left) ? 1 : -1;

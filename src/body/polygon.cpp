@@ -76,10 +76,10 @@ std::optional<shapes::Problem> Polygon::problem(int /*dimension*/) const {
   const auto crossing = crossing_edges(edges);
   if (!crossing) return std::nullopt;
   const Vec3 &a = edges[crossing->first].from, &b = edges[crossing->second].from;
-  return shapes::Problem{"points",
-                         fmt::format("the edges that begin at [{}, {}] and [{}, {}] cross or touch each other; give the "
-                                     "corners in the order in which they follow each other around the body",
-                                     a.x(), a.y(), b.x(), b.y())};
+  return shapes::Problem{
+      "points", fmt::format("the edges that begin at [{}, {}] and [{}, {}] cross or touch each other; give the "
+                            "corners in the order in which they follow each other around the body",
+                            a.x(), a.y(), b.x(), b.y())};
 }
 
 /// Crossing number of the ray towards +x, without division; a point within the margin of an edge is inside.

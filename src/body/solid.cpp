@@ -1,9 +1,10 @@
 // Where surfaces have their inside.
 
+#include "cairn/body/solid.hpp"
+
 #include <algorithm>
 #include <cmath>
 
-#include "cairn/body/solid.hpp"
 #include "triangle_tree.hpp"
 
 namespace cairn {
@@ -115,10 +116,11 @@ struct Solid::State {
     std::array<int, 3> low, high;
     for (int k = 0; k < 3; ++k) {
       const auto at = [&](double x) { return std::clamp((x - box.lower[k]) / cell[k], 0.0, cells[k] - 1.0); };
-      low[k] = static_cast<int>(at(b.lower[k] - 1e-9 * cell[k])), high[k] = static_cast<int>(at(b.upper[k] + 1e-9 * cell[k]));
+      low[k] = static_cast<int>(at(b.lower[k] - 1e-9 * cell[k])),
+      high[k] = static_cast<int>(at(b.upper[k] + 1e-9 * cell[k]));
     }
-    const Vec3 normal = (triangles.points[c[1]] - triangles.points[c[0]])
-                            .cross(triangles.points[c[2]] - triangles.points[c[0]]);
+    const Vec3 normal =
+        (triangles.points[c[1]] - triangles.points[c[0]]).cross(triangles.points[c[2]] - triangles.points[c[0]]);
     const double reach = 0.5 * normal.cwiseAbs().dot(cell) * (1 + 1e-6);
     for (int z = low[2]; z <= high[2]; ++z)
       for (int y = low[1]; y <= high[1]; ++y)
@@ -134,8 +136,8 @@ struct Solid::State {
     constexpr double most = 256;
     const Vec3 extent = box.upper - box.lower;
     const double area = 2 * (extent.x() * extent.y() + extent.y() * extent.z() + extent.z() * extent.x());
-    const double side = std::max(std::sqrt(area / static_cast<double>(triangles.corners.size() + 500)),
-                                 extent.maxCoeff() / most);
+    const double side =
+        std::max(std::sqrt(area / static_cast<double>(triangles.corners.size() + 500)), extent.maxCoeff() / most);
     std::size_t count = 1;
     for (int k = 0; k < 3; ++k) {
       cells[k] = std::max(1, static_cast<int>(std::ceil(extent[k] / side)));

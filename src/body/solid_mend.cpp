@@ -1,12 +1,11 @@
 // Mending surfaces, and what is wrong with them.
 
-#include "cairn/body/solid.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <numeric>
 #include <unordered_map>
 
+#include "cairn/body/solid.hpp"
 #include "triangle_tree.hpp"
 
 namespace cairn {
@@ -237,7 +236,8 @@ bool pass_through(const Triangles& t, const Corners& a, const Corners& b, double
   const auto any_side = [&](const Corners& from, const Corners& through) {
     for (int k = 0; k < 3; ++k) {
       const auto p = from[k], q = from[(k + 1) % 3];
-      if (!has(through, p) && !has(through, q) && pierces(t.points[p], t.points[q], points(through), least)) return true;
+      if (!has(through, p) && !has(through, q) && pierces(t.points[p], t.points[q], points(through), least))
+        return true;
     }
     return false;
   };

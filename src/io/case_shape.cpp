@@ -53,8 +53,7 @@ std::optional<Shape> read_compound(Table& t, CompoundOperation operation, Draft&
     t.error("of", fmt::format("holds {} shapes; this operation needs at least {}", parts.size(), least));
   for (Table& part : parts)
     if (auto shape = read_shape(part, draft, errors)) {
-      if (is_several(*shape))
-        part.error("file", "stands for each of its parts, which a compound cannot; name one");
+      if (is_several(*shape)) part.error("file", "stands for each of its parts, which a compound cannot; name one");
       compound.of.push_back(std::move(*shape));
     }
   return compound;

@@ -49,7 +49,8 @@ std::vector<LinePart> read_csv_lines(std::string_view bytes) {
         if (std::max(x, y) == std::string_view::npos) scanner.fail("the first line names no columns x and y");
         continue;
       }
-      if (width != 2) scanner.fail(fmt::format("has {} values; the first line must name the columns x, y[, line]", width));
+      if (width != 2)
+        scanner.fail(fmt::format("has {} values; the first line must name the columns x, y[, line]", width));
     }
     if (cells.size() != width) scanner.fail(fmt::format("has {} values; {} are expected", cells.size(), width));
     if (which != std::string_view::npos && cells[which] != last) fresh = true, last = cells[which];
@@ -63,7 +64,8 @@ std::vector<LinePart> read_lines(std::string_view bytes) {
   const std::string_view text = without_mark(bytes);
   const std::size_t first = std::min(text.find_first_not_of(" \t\r\n"), text.size());
   const std::string_view head = text.substr(first, 2000);
-  if (text.find('\0') != text.npos) throw InputError(": is no text; an outline is CSV, SVG or DXF (not its binary form)");
+  if (text.find('\0') != text.npos)
+    throw InputError(": is no text; an outline is CSV, SVG or DXF (not its binary form)");
   if (head.starts_with('<')) return read_svg_lines(text);
   const std::string_view code = head.substr(0, head.find_first_of("\r\n"));
   if ((code == "0" || code == "999") && text.find("SECTION") != text.npos) return read_dxf_lines(text);

@@ -163,12 +163,14 @@ std::vector<LinePart> read_dxf_lines(std::string_view bytes) {
   while (!open.empty()) {
     Drawn d = std::move(open.front());
     open.erase(open.begin());
-    const auto joins = [&](const Drawn& o) { return !o.closed && (same(o.points.front(), d.points.back()) || same(o.points.back(), d.points.back())); };
+    const auto joins = [&](const Drawn& o) {
+      return !o.closed && (same(o.points.front(), d.points.back()) || same(o.points.back(), d.points.back()));
+    };
     while (!d.closed && !same(d.points.front(), d.points.back())) {
       const auto next = std::ranges::find_if(open, joins);
       if (next == open.end())
-        throw InputError(fmt::format(":{}: the line that begins here ends at [{}, {}], where nothing goes on; close it", d.at,
-                                     d.points.back().x(), d.points.back().y()));
+        throw InputError(fmt::format(":{}: the line that begins here ends at [{}, {}], where nothing goes on; close it",
+                                     d.at, d.points.back().x(), d.points.back().y()));
       if (!same(next->points.front(), d.points.back())) std::ranges::reverse(next->points);
       d.points.insert(d.points.end(), next->points.begin() + 1, next->points.end());
       open.erase(next);

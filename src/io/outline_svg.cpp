@@ -59,7 +59,8 @@ class Numbers {
 
  private:
   void skip() {
-    while (!rest_.empty() && (std::isspace(static_cast<unsigned char>(rest_[0])) || rest_[0] == ',')) rest_.remove_prefix(1);
+    while (!rest_.empty() && (std::isspace(static_cast<unsigned char>(rest_[0])) || rest_[0] == ','))
+      rest_.remove_prefix(1);
   }
   Text place_;
   std::string_view rest_;
@@ -134,7 +135,8 @@ class Path {
   }
   /// What a smooth curve begins with: the last control point on the other side.
   Vec3 reflected(std::string_view after) const {
-    return after.find(static_cast<char>(std::toupper(last_))) != after.npos ? (2 * line_.back() - control_).eval() : line_.back();
+    return after.find(static_cast<char>(std::toupper(last_))) != after.npos ? (2 * line_.back() - control_).eval()
+                                                                            : line_.back();
   }
 
   void step() {
@@ -156,10 +158,19 @@ class Path {
   void draw(char kind, bool relative) {
     std::vector<Vec3> curve = {line_.back()};
     switch (kind) {
-      case 'L': line_.push_back(point(relative)); break;
-      case 'H': line_.emplace_back((relative ? curve[0].x() : 0) + numbers_.next(), curve[0].y(), 0.0); break;
-      case 'V': line_.emplace_back(curve[0].x(), (relative ? curve[0].y() : 0) + numbers_.next(), 0.0); break;
-      case 'C': case 'S': case 'Q': case 'T': {
+      case 'L':
+        line_.push_back(point(relative));
+        break;
+      case 'H':
+        line_.emplace_back((relative ? curve[0].x() : 0) + numbers_.next(), curve[0].y(), 0.0);
+        break;
+      case 'V':
+        line_.emplace_back(curve[0].x(), (relative ? curve[0].y() : 0) + numbers_.next(), 0.0);
+        break;
+      case 'C':
+      case 'S':
+      case 'Q':
+      case 'T': {
         if (kind == 'S') curve.push_back(reflected("CS"));
         if (kind == 'T') curve.push_back(reflected("QT"));
         for (int more = kind == 'C' ? 3 : kind == 'T' ? 1 : 2; more > 0; --more) curve.push_back(point(relative));
@@ -173,7 +184,8 @@ class Path {
         add_arc(line_, rx, ry, turn, large, sweep, point(relative));
         break;
       }
-      default: numbers_.fail(fmt::format("'{}' is no command of a path", command_));
+      default:
+        numbers_.fail(fmt::format("'{}' is no command of a path", command_));
     }
   }
 
@@ -225,7 +237,9 @@ Map transform_of(const Tag& tag) {
     } else if (name == "scale") {
       all.scale(Eigen::Vector2d(v[0], given > 1 ? v[1] : v[0]));
     } else if (name == "rotate") {
-      all.translate(Eigen::Vector2d(v[1], v[2])).rotate(v[0] * std::numbers::pi / 180).translate(Eigen::Vector2d(-v[1], -v[2]));
+      all.translate(Eigen::Vector2d(v[1], v[2]))
+          .rotate(v[0] * std::numbers::pi / 180)
+          .translate(Eigen::Vector2d(-v[1], -v[2]));
     } else if (name == "matrix" && given == 6) {
       Map m = Map::Identity();
       m.matrix() << v[0], v[2], v[4], v[1], v[3], v[5], 0, 0, 1;

@@ -66,7 +66,8 @@ std::string foreign(const fs::path& file, const F& is_own) {
 std::string foreign_result(const fs::path& file) {
   const std::string name = file.filename().string();
   return foreign(file, [&](std::string_view head) {
-    if (name.starts_with(reading::shape_copy)) return reading::is_shape_copy(name, PosixFile(file, O_RDONLY | O_NOFOLLOW));
+    if (name.starts_with(reading::shape_copy))
+      return reading::is_shape_copy(name, PosixFile(file, O_RDONLY | O_NOFOLLOW));
     return is_marked(name, head);
   });
 }

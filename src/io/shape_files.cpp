@@ -17,8 +17,8 @@ std::string near(const Vec3& x) { return fmt::format("near [{:.6g}, {:.6g}, {:.6
 
 /// What `read` makes of the file that a shape names, read once for all shapes; notes its copy. Nothing after an error.
 template <class T>
-std::shared_ptr<const T> contents_of(ShapeFile& file, std::map<std::string, FileParts<T>>& known, T (*read)(std::string_view),
-                                     std::string_view what, Table& table, Draft& draft) {
+std::shared_ptr<const T> contents_of(ShapeFile& file, std::map<std::string, FileParts<T>>& known,
+                                     T (*read)(std::string_view), std::string_view what, Table& table, Draft& draft) {
   std::string name;
   try {
     const std::filesystem::path path = path_of_file(file.name, table, draft);
@@ -42,10 +42,11 @@ std::shared_ptr<const T> contents_of(ShapeFile& file, std::map<std::string, File
 void report(const SurfaceFaults& faults, const std::string& which, const Mesh& mesh, Table& table, Draft& draft) {
   const double factor = mesh.placement.factor();
   if (faults.open_edges > 0 && !(factor * faults.largest_hole <= mesh.holes))
-    table.error("file",
-                fmt::format("{} has {} open edges, the first {}: it is not closed, and what lies inside is not told; close "
-                            "it, or allow holes of that size: holes = {:.3g} (in m, the largest is so wide)",
-                            which, faults.open_edges, near(faults.open_at), 1.001 * factor * faults.largest_hole));
+    table.error(
+        "file",
+        fmt::format("{} has {} open edges, the first {}: it is not closed, and what lies inside is not told; close "
+                    "it, or allow holes of that size: holes = {:.3g} (in m, the largest is so wide)",
+                    which, faults.open_edges, near(faults.open_at), 1.001 * factor * faults.largest_hole));
   const auto warn = [&](std::int64_t count, const Vec3& where, std::string_view text) {
     if (count > 0)
       draft.result.warnings.push_back(
@@ -117,7 +118,8 @@ std::shared_ptr<const Solid> make_solid(const std::vector<SolidPart>& parts, con
   }
   auto solid = std::make_shared<Solid>(std::move(all), closed);
   if (!(solid->volume() > 0)) {
-    table.error("file", fmt::format("{} encloses a volume of {:.3g}; it must be above 0", mesh.file.name, solid->volume()));
+    table.error("file",
+                fmt::format("{} encloses a volume of {:.3g}; it must be above 0", mesh.file.name, solid->volume()));
     return nullptr;
   }
   return solid;
@@ -132,7 +134,8 @@ void load(Mesh& mesh, Table& table, Draft& draft) {
     mesh.count = parts->size();
     return;
   }
-  auto& known = draft.solids[fmt::format("{:x} {} {} {}", mesh.file.checksum, mesh.holes, mesh.placement.factor(), mesh.solid)];
+  auto& known =
+      draft.solids[fmt::format("{:x} {} {} {}", mesh.file.checksum, mesh.holes, mesh.placement.factor(), mesh.solid)];
   if (!known) known = make_solid(*parts, mesh, table, draft);
   mesh.inside = known;
   if (!mesh.inside) return;
@@ -143,7 +146,8 @@ void load(Mesh& mesh, Table& table, Draft& draft) {
 
 void load(Outline& outline, Table& table, Draft& draft) {
   const std::size_t before = table.error_count();
-  const auto parts = contents_of(outline.file, draft.outlines, read_lines, "an outline (CSV, SVG or DXF)", table, draft);
+  const auto parts =
+      contents_of(outline.file, draft.outlines, read_lines, "an outline (CSV, SVG or DXF)", table, draft);
   if (!parts) return;
   if (outline.line == each) {
     outline.count = parts->size();
@@ -155,9 +159,9 @@ void load(Outline& outline, Table& table, Draft& draft) {
   auto loops = std::make_shared<Loops>(lines);
   if (loops->edges().empty()) return table.error("file", outline.file.name + " holds no closed line");
   if (const auto crossing = crossing_edges(loops->edges()))
-    return table.error("file", fmt::format("{}: the edges that begin {} and {} cross or touch each other", outline.file.name,
-                                           near(loops->edges()[crossing->first].from),
-                                           near(loops->edges()[crossing->second].from)));
+    return table.error(
+        "file", fmt::format("{}: the edges that begin {} and {} cross or touch each other", outline.file.name,
+                            near(loops->edges()[crossing->first].from), near(loops->edges()[crossing->second].from)));
   if (!(loops->area() > 0)) return table.error("file", outline.file.name + ": its lines enclose no area");
   outline.loops = std::move(loops);
   outline.place = Place(outline.placement);

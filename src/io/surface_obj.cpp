@@ -49,7 +49,8 @@ std::vector<SolidPart> read_obj(std::string_view bytes) {
   };
   while (scanner.next_line()) {
     const std::string_view word = scanner.word();
-    if (word.empty() || word.starts_with('#') || std::ranges::find(passed_over, word) != std::end(passed_over)) continue;
+    if (word.empty() || word.starts_with('#') || std::ranges::find(passed_over, word) != std::end(passed_over))
+      continue;
     if (word == "v") {
       const double x = scanner.number("x of a vertex"), y = scanner.number("y of a vertex");
       points.emplace_back(x, y, scanner.number("z of a vertex"));
@@ -62,8 +63,8 @@ std::vector<SolidPart> read_obj(std::string_view bytes) {
     } else if (word == "o" || word == "g") {
       parts.push_back({std::string(scanner.rest_of_line()), fmt::format("line {}", scanner.line()), {}});
     } else {
-      scanner.fail(fmt::format("{} is no word of an OBJ file ({}), and the file is no STL or PLY either", in_quotes(word),
-                               listed(words)));
+      scanner.fail(fmt::format("{} is no word of an OBJ file ({}), and the file is no STL or PLY either",
+                               in_quotes(word), listed(words)));
     }
   }
   std::erase_if(parts, [](const SolidPart& p) { return p.triangles.corners.empty(); });

@@ -14,10 +14,10 @@ namespace {
 
 enum class Number { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 constexpr Named<Number> number_names[] = {
-    {"char", Number::int8},      {"uchar", Number::uint8},     {"short", Number::int16},     {"ushort", Number::uint16},
-    {"int", Number::int32},      {"uint", Number::uint32},     {"float", Number::float32},   {"double", Number::float64},
-    {"int8", Number::int8},      {"uint8", Number::uint8},     {"int16", Number::int16},     {"uint16", Number::uint16},
-    {"int32", Number::int32},    {"uint32", Number::uint32},   {"float32", Number::float32}, {"float64", Number::float64}};
+    {"char", Number::int8},   {"uchar", Number::uint8},   {"short", Number::int16},     {"ushort", Number::uint16},
+    {"int", Number::int32},   {"uint", Number::uint32},   {"float", Number::float32},   {"double", Number::float64},
+    {"int8", Number::int8},   {"uint8", Number::uint8},   {"int16", Number::int16},     {"uint16", Number::uint16},
+    {"int32", Number::int32}, {"uint32", Number::uint32}, {"float32", Number::float32}, {"float64", Number::float64}};
 
 struct Property {
   std::string name;
@@ -72,7 +72,8 @@ Head read_head(std::string_view bytes) {
       if (head.elements.empty()) scanner.fail("a property comes before the first element");
       Property property;
       std::string_view type = scanner.word();
-      if ((property.is_list = type == "list")) property.count_type = number_type(scanner, scanner.word()), type = scanner.word();
+      if ((property.is_list = type == "list"))
+        property.count_type = number_type(scanner, scanner.word()), type = scanner.word();
       property.type = number_type(scanner, type), property.name = scanner.word();
       head.elements.back().properties.push_back(property);
     } else if (!word.empty() && word != "comment" && word != "obj_info") {
@@ -86,19 +87,28 @@ Head read_head(std::string_view bytes) {
 /// The numbers behind the head, one after the other.
 class Body {
  public:
-  Body(std::string_view bytes, const Head& head) : form_(head.form), rest_(bytes.substr(head.bytes)), lines_(head.lines) {}
+  Body(std::string_view bytes, const Head& head)
+      : form_(head.form), rest_(bytes.substr(head.bytes)), lines_(head.lines) {}
 
   double next(Number type) {
     if (form_ == Form::text) return next_word();
     switch (type) {
-      case Number::int8: return next_as<std::int8_t>();
-      case Number::uint8: return next_as<std::uint8_t>();
-      case Number::int16: return next_as<std::int16_t>();
-      case Number::uint16: return next_as<std::uint16_t>();
-      case Number::int32: return next_as<std::int32_t>();
-      case Number::uint32: return next_as<std::uint32_t>();
-      case Number::float32: return next_as<float>();
-      case Number::float64: return next_as<double>();
+      case Number::int8:
+        return next_as<std::int8_t>();
+      case Number::uint8:
+        return next_as<std::uint8_t>();
+      case Number::int16:
+        return next_as<std::int16_t>();
+      case Number::uint16:
+        return next_as<std::uint16_t>();
+      case Number::int32:
+        return next_as<std::int32_t>();
+      case Number::uint32:
+        return next_as<std::uint32_t>();
+      case Number::float32:
+        return next_as<float>();
+      case Number::float64:
+        return next_as<double>();
     }
     return 0;
   }
@@ -120,7 +130,8 @@ class Body {
   }
   double next_word() {
     std::size_t first = 0;
-    while (first < rest_.size() && std::isspace(static_cast<unsigned char>(rest_[first]))) lines_ += rest_[first++] == '\n';
+    while (first < rest_.size() && std::isspace(static_cast<unsigned char>(rest_[first])))
+      lines_ += rest_[first++] == '\n';
     rest_.remove_prefix(first);
     if (rest_.empty()) fail(*element_, number_, "the file ends before it; it is cut off");
     const std::string_view word = rest_.substr(0, rest_.find_first_of(" \t\r\n"));

@@ -99,7 +99,8 @@ std::vector<SolidPart> read_binary_stl(std::string_view bytes) {
     for (int corner = 0; corner < 3; ++corner) {
       const float* x = numbers + 3 + 3 * corner;  // behind the normal
       if (!std::isfinite(x[0]) || !std::isfinite(x[1]) || !std::isfinite(x[2]))
-        throw InputError(fmt::format(": facet {} (byte {}) has a corner that is no finite number", i, head + i * facet));
+        throw InputError(
+            fmt::format(": facet {} (byte {}) has a corner that is no finite number", i, head + i * facet));
       part.triangles.points.emplace_back(x[0], x[1], x[2]);
     }
     part.triangles.corners.push_back({first, first + 1, first + 2});
@@ -120,10 +121,11 @@ std::vector<SolidPart> read_solids(std::string_view bytes) {
   const std::string_view text = without_mark(bytes);
   const std::size_t first = std::min(text.find_first_not_of(" \t\r\n"), text.size());
   if (text.find('\0') != text.npos) {
-    throw InputError(fmt::format(": is no file that is known (STL, PLY, OBJ); a binary STL with the {} facets that its "
-                                 "head names has {} bytes, this file has {}{}",
-                                 count, head + facet * std::size_t{count}, bytes.size(),
-                                 bytes.size() < head + facet * std::size_t{count} ? ": it is cut off" : ""));
+    throw InputError(
+        fmt::format(": is no file that is known (STL, PLY, OBJ); a binary STL with the {} facets that its "
+                    "head names has {} bytes, this file has {}{}",
+                    count, head + facet * std::size_t{count}, bytes.size(),
+                    bytes.size() < head + facet * std::size_t{count} ? ": it is cut off" : ""));
   }
   return lower_case(text.substr(first, 5)) == "solid" ? read_ascii_stl(text) : read_obj(text);
 }

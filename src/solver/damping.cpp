@@ -32,7 +32,8 @@ struct NetMotion {
 
 template <int Dim>
 NetMotion motion_of(const Piece<Dim>& piece, double density,
-                 const std::vector<std::array<double, spin_size<Dim>>>& inertia, const Vec<Dim>& gravity, double dt) {
+                    const std::vector<std::array<double, spin_size<Dim>>>& inertia, const Vec<Dim>& gravity,
+                    double dt) {
   using C = PointColumns<Dim>;
   NetMotion motion;
   for (int p = 0; p < piece.points.size(); ++p) {

@@ -28,7 +28,8 @@ struct Voxels {
               std::size_t i = 0;
               for (std::int64_t z = low[2]; z < low[2] + n[2]; ++z)
                 for (std::int64_t y = low[1]; y < low[1] + n[1]; ++y)
-                  for (std::int64_t x = low[0]; x < low[0] + n[0]; ++x) to[i++] = labels.at((z * size[1] + y) * size[0] + x);
+                  for (std::int64_t x = low[0]; x < low[0] + n[0]; ++x)
+                    to[i++] = labels.at((z * size[1] + y) * size[0] + x);
             }};
   }
 };
@@ -49,7 +50,8 @@ TEST(LabelVolume, FlatFacesStayWhereTheyAreAndNothingIsHeldTwiceOrNotAtAll) {
 TEST(LabelVolume, ADiscIsRoundThoughItsVoxelsAreStairs) {
   constexpr double r = 16.3;
   const Vec3 centre(24.2, 23.9, 0);
-  Voxels voxels({48, 48, 1}, [&](double x, double y, double) { return std::hypot(x - centre.x(), y - centre.y()) < r ? 1 : 0; });
+  Voxels voxels({48, 48, 1},
+                [&](double x, double y, double) { return std::hypot(x - centre.x(), y - centre.y()) < r ? 1 : 0; });
   const LabelVolume volume = voxels.volume(2, {1});
   constexpr int directions = 720;
   const auto roughness = [&](auto&& inside) {  // standard deviation of the radius, in voxels

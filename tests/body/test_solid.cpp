@@ -16,11 +16,11 @@ constexpr double pi = std::numbers::pi;
 Triangles sphere(int n, double radius = 1, const Vec3& centre = Vec3::Zero()) {
   const double g = (1 + std::sqrt(5.0)) / 2;
   Triangles t;
-  t.points = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g}, {0, -1, -g}, {0, 1, -g},
-              {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
-  t.corners = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2},
-               {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5},
-               {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+  t.points = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+              {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
+  t.corners = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+               {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+               {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
   for (int level = 0; level < n; ++level) {
     std::map<std::pair<int, int>, int> middles;
     const auto middle = [&](int a, int b) {
@@ -79,7 +79,8 @@ TEST(Solid, ASphereOfTrianglesHoldsWhatTheSphereHolds) {
   EXPECT_NEAR(solid.volume(), 4 * pi / 3, 0.003 * 4 * pi / 3);
   EXPECT_LT(solid.centroid().norm(), 1e-12);
   EXPECT_NEAR(solid.thickness(), 2, 0.01);
-  EXPECT_EQ(differences(solid, [](const Vec3& x) { return std::abs(x.norm() - 1) < 1e-3 ? -1 : int(x.norm() < 1); }), 0);
+  EXPECT_EQ(differences(solid, [](const Vec3& x) { return std::abs(x.norm() - 1) < 1e-3 ? -1 : int(x.norm() < 1); }),
+            0);
 }
 
 TEST(Solid, NoLineSlipsThroughEdgesAndCorners) {
@@ -120,7 +121,8 @@ TEST(Solid, TurnedAndRepeatedTrianglesAreMended) {
   EXPECT_EQ(faults.flat, 1);
   EXPECT_EQ(faults.open_edges, 0);
   const Solid solid(t, true);
-  EXPECT_EQ(differences(solid, [](const Vec3& x) { return std::abs(x.norm() - 1) < 0.02 ? -1 : int(x.norm() < 1); }), 0);
+  EXPECT_EQ(differences(solid, [](const Vec3& x) { return std::abs(x.norm() - 1) < 0.02 ? -1 : int(x.norm() < 1); }),
+            0);
 }
 
 TEST(Solid, WhatIsInsideOutIsTurnedAndACavityIsNot) {
@@ -146,7 +148,8 @@ TEST(Solid, AHoleIsFoundAndClosedWhereItIsSmall) {
   EXPECT_GT(faults.largest_hole, 0.05);
   EXPECT_LT(faults.largest_hole, 0.2);
   const Solid solid(t, false);
-  EXPECT_EQ(differences(solid, [](const Vec3& x) { return std::abs(x.norm() - 1) < 0.05 ? -1 : int(x.norm() < 1); }, 3000),
+  EXPECT_EQ(differences(
+                solid, [](const Vec3& x) { return std::abs(x.norm() - 1) < 0.05 ? -1 : int(x.norm() < 1); }, 3000),
             0);
 }
 
@@ -168,7 +171,8 @@ TEST(Solid, APlacedMeshIsScaledTurnedAndMoved) {
 }
 
 TEST(Loops, HolesCountWhicheverWayTheyRun) {
-  const std::vector<Vec3> outer = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}}, hole = {{1, 1, 0}, {3, 1, 0}, {3, 3, 0}, {1, 3, 0}};
+  const std::vector<Vec3> outer = {{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}},
+                          hole = {{1, 1, 0}, {3, 1, 0}, {3, 3, 0}, {1, 3, 0}};
   std::vector<Vec3> other(hole.rbegin(), hole.rend());
   for (const auto& inner : {hole, other}) {
     const Loops loops({outer, inner});

@@ -20,8 +20,8 @@ namespace cairn {
 struct LabelFacts {
   std::int64_t label = 0;
   std::int64_t voxels = 0;
-  Bounds box;                         // of its voxels
-  Vec3 inner_centre = Vec3::Zero();   // of the largest ball (disk) within its voxels
+  Bounds box;                        // of its voxels
+  Vec3 inner_centre = Vec3::Zero();  // of the largest ball (disk) within its voxels
   double inner_radius = 0;
   double weight = 1;
 };
@@ -50,7 +50,7 @@ class LabelVolume {
   int label_at(const Vec3& x) const;
 
  private:
-  static constexpr int side = 32;  // of a block, in voxels
+  static constexpr int side = 32;                              // of a block, in voxels
   static constexpr std::size_t room = std::size_t{256} << 20;  // bytes of blocks that are kept
 
   /// Nodes, the centres of voxels, from the block's first to one beyond its last.

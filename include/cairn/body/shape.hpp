@@ -21,8 +21,7 @@ namespace cairn {
 struct Compound;
 
 /// New ones at the end: checkpoints know a shape by its place here.
-using Shape =
-    std::variant<Ball, BoxShape, Ellipsoid, Polygon, Cylinder, HalfSpace, Compound, Mesh, Outline, LabelBody>;
+using Shape = std::variant<Ball, BoxShape, Ellipsoid, Polygon, Cylinder, HalfSpace, Compound, Mesh, Outline, LabelBody>;
 
 enum class CompoundOperation { union_of, difference, intersection };
 /// Union, difference (the first without the others) or intersection of shapes.

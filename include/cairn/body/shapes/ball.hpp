@@ -17,9 +17,7 @@ struct Ball {
     keys.vector("centre", s.centre);
     keys.positive("radius", s.radius);
   }
-  bool holds(const Vec3& x) const {
-    return (x - centre).squaredNorm() <= radius * radius * (1 + shapes::margin);
-  }
+  bool holds(const Vec3& x) const { return (x - centre).squaredNorm() <= radius * radius * (1 + shapes::margin); }
   Bounds extent() const { return shapes::around(centre, Vec3::Constant(radius)); }
   double width() const { return 2 * radius; }
 };

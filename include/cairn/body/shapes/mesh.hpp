@@ -12,8 +12,8 @@ struct Mesh {
 
   ShapeFile file;
   Placement placement;
-  std::string solid;  // its name, or "#N" by its number from 0; empty: all that the file holds
-  double holes = 0;   // the largest that is closed [m]
+  std::string solid;                      // its name, or "#N" by its number from 0; empty: all that the file holds
+  double holes = 0;                       // the largest that is closed [m]
   std::shared_ptr<const Solid> inside{};  // in the file's lengths
   Place place{};
   Bounds box{};

@@ -12,7 +12,7 @@ struct Outline {
 
   ShapeFile file;
   Placement placement;
-  std::string line;  // its name, or "#N" by its number from 0; empty: all that the file holds
+  std::string line;                      // its name, or "#N" by its number from 0; empty: all that the file holds
   std::shared_ptr<const Loops> loops{};  // in the file's lengths
   Place place{};
   Bounds box{};

@@ -20,7 +20,7 @@ struct LengthUnit {
   std::string_view name;
   double metres;
 };
-inline constexpr LengthUnit length_units[] = {{"m", 1.0},   {"cm", 1e-2},    {"mm", 1e-3},
+inline constexpr LengthUnit length_units[] = {{"m", 1.0},   {"cm", 1e-2}, {"mm", 1e-3},
                                               {"um", 1e-6}, {"nm", 1e-9}, {"inch", 0.0254}};
 
 struct Placement {
@@ -49,7 +49,9 @@ class Place {
   explicit Place(const Placement& p)
       : turn_(p.turn()), move_(p.move), factor_(p.factor()), turned_(p.rotate != Vec3::Zero()) {}
   double factor() const { return factor_; }
-  Vec3 in_space(const Vec3& x) const { return move_ + (turned_ ? (turn_ * (factor_ * x)).eval() : (factor_ * x).eval()); }
+  Vec3 in_space(const Vec3& x) const {
+    return move_ + (turned_ ? (turn_ * (factor_ * x)).eval() : (factor_ * x).eval());
+  }
   Vec3 in_file(const Vec3& x) const {
     const Vec3 d = x - move_;
     return (turned_ ? (turn_.transpose() * d).eval() : d) / factor_;
