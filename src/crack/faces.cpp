@@ -352,7 +352,8 @@ std::vector<RowForce<Dim>> find_row_forces(
     const Vec<Dim> pull = point.bond.length * traction(point, opening);
     for (const int side : {-1, 1})
       for (const auto& at : rows[side > 0].rows)
-        forces.push_back({around.patch.id, point.crack, point.index, side, at.place, at.sides, -side * at.weight * pull});
+        forces.push_back(
+            {around.patch.id, point.crack, point.index, side, at.place, at.sides, -side * at.weight * pull});
   }
   return forces;
 }
@@ -385,16 +386,15 @@ void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, con
   }
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                     \
-  template FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>&, const CrackPoint<Dim>&, int); \
-  template std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>&,        \
-                                                             const CrackSurroundings<Dim>&);       \
-  template double fill_at(const CrackSurroundings<Dim>&, int, const Vec<Dim>&);                     \
-  template std::vector<RowForce<Dim>> find_row_forces(                                             \
-      const CrackSurroundings<Dim>&, double,                                                       \
-      const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>&);                    \
-  template void sort_row_forces(std::vector<RowForce<Dim>>&);                                      \
-  template void add_row_forces(Patch<Dim>&, const CrackSurroundings<Dim>&, const std::vector<RowForce<Dim>>&); \
+#define CAIRN_INSTANTIATE(Dim)                                                                                         \
+  template FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>&, const CrackPoint<Dim>&, int);                     \
+  template std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>&,                            \
+                                                             const CrackSurroundings<Dim>&);                           \
+  template double fill_at(const CrackSurroundings<Dim>&, int, const Vec<Dim>&);                                        \
+  template std::vector<RowForce<Dim>> find_row_forces(                                                                 \
+      const CrackSurroundings<Dim>&, double, const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>&); \
+  template void sort_row_forces(std::vector<RowForce<Dim>>&);                                                          \
+  template void add_row_forces(Patch<Dim>&, const CrackSurroundings<Dim>&, const std::vector<RowForce<Dim>>&);         \
   template void borrow_face_velocities(std::vector<CrackPoint<Dim>>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

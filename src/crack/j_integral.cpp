@@ -71,7 +71,8 @@ TipSums tip_terms(const CrackTip& tip, const TipPoint& point, double inner, doub
   return sums;
 }
 
-TipSums face_terms(const CrackTip& tip, const Vec<2>& x, const Vec<2>& force, double width, double inner, double outer) {
+TipSums face_terms(const CrackTip& tip, const Vec<2>& x, const Vec<2>& force, double width, double inner,
+                   double outer) {
   TipSums sums;
   const Vec<2> away = x - tip.position, normal(-tip.ahead.y(), tip.ahead.x());
   const double behind = -away.dot(tip.ahead);

@@ -44,8 +44,9 @@ void read_interface(Table& table, CrackSpec& crack) {
   law.opening = stiffness(table, "normal_stiffness"), law.closing = stiffness(table, "closing_stiffness");
   law.sliding = stiffness(table, "tangential_stiffness");
   if (!std::isfinite(law.opening) && !std::isfinite(law.sliding))
-    table.error("law", "is \"interface\" and perfect in all directions; give normal_stiffness or tangential_stiffness "
-                       "[Pa/m], or use law = \"stick\"");
+    table.error("law",
+                "is \"interface\" and perfect in all directions; give normal_stiffness or tangential_stiffness "
+                "[Pa/m], or use law = \"stick\"");
   if (std::isfinite(law.closing) && !std::isfinite(law.opening))
     table.error("closing_stiffness", "needs normal_stiffness: what cannot open does not close");
 }

@@ -98,10 +98,11 @@ void check_hoop_materials(Table& table, const Case& c, const CrackSpec& crack) {
     const Material& material = c.materials[c.bodies[b].material];
     if (!crack.cuts(b, c.bodies[b].group) || is_prescribed(c, b)) continue;
     if (material.model == "hypoelastic" || material.model == "neo_hookean") continue;
-    return table.error("", fmt::format("{}: growth by hoop stress needs stress intensities, which the model {} of body {} "
-                                       "has not; use hypoelastic or neo_hookean, or criterion = \"energy\" with "
-                                       "direction = \"straight\"",
-                                       crack.source, in_quotes(material.model), b));
+    return table.error("",
+                       fmt::format("{}: growth by hoop stress needs stress intensities, which the model {} of body {} "
+                                   "has not; use hypoelastic or neo_hookean, or criterion = \"energy\" with "
+                                   "direction = \"straight\"",
+                                   crack.source, in_quotes(material.model), b));
   }
 }
 

@@ -46,9 +46,10 @@ std::string place(const GrainCrack& row, CrackSpec crack, Case& c) {
   if (is_prescribed(c, row.grain)) return fmt::format("{}: body {} is rigid and cannot crack", row.source, row.grain);
   const Vec3 middle = centre(shape) + Vec3(row.x, row.y, 0);
   if (!contains(shape, middle))
-    return fmt::format("{}: the middle of the crack, {:.6g}, {:.6g} m, lies outside body {}; x and y count from the "
-                       "body's centre",
-                       row.source, middle.x(), middle.y(), row.grain);
+    return fmt::format(
+        "{}: the middle of the crack, {:.6g}, {:.6g} m, lies outside body {}; x and y count from the "
+        "body's centre",
+        row.source, middle.x(), middle.y(), row.grain);
   if (!(row.length > 0)) return fmt::format("{}: the length must be above 0", row.source);
   const Vec3 half = 0.5 * row.length * Vec3(std::cos(row.angle), std::sin(row.angle), 0);
   const double cell = smallest_cell(c.domain);

@@ -33,12 +33,9 @@ inline constexpr Named<FaceType> face_type_names[] = {
     {"free", FaceType::free}, {"fixed", FaceType::fixed}, {"symmetry", FaceType::symmetry}, {"wall", FaceType::wall}};
 inline constexpr Named<Leaving> leaving_names[] = {{"remove", Leaving::remove}, {"stop", Leaving::stop}};
 inline constexpr Named<LostPoints> lost_points_names[] = {{"stop", LostPoints::stop}, {"drop", LostPoints::drop}};
-inline constexpr Named<CrackLaw> crack_law_names[] = {{"stick", CrackLaw::stick},
-                                                      {"friction", CrackLaw::friction},
-                                                      {"frictionless", CrackLaw::frictionless},
-                                                      {"free", CrackLaw::free},
-                                                      {"interface", CrackLaw::interface},
-                                                      {"cohesive", CrackLaw::cohesive}};
+inline constexpr Named<CrackLaw> crack_law_names[] = {
+    {"stick", CrackLaw::stick}, {"friction", CrackLaw::friction},   {"frictionless", CrackLaw::frictionless},
+    {"free", CrackLaw::free},   {"interface", CrackLaw::interface}, {"cohesive", CrackLaw::cohesive}};
 inline constexpr Named<CohesiveShape> cohesive_shape_names[] = {{"triangle", CohesiveShape::triangle},
                                                                 {"linear", CohesiveShape::linear},
                                                                 {"exponential", CohesiveShape::exponential}};

@@ -81,14 +81,16 @@ void check_time_step(Case& c, Errors& errors) {
   const FirstStep first = first_step(c);
   const double of_cracks = longest_traction_step(c), of_waves = c.time.cfl * first.crossing;
   if (c.time.dt > of_cracks)
-    errors.add({c.file.string(), 0}, "time.dt",
-               fmt::format("{:.6g} s is too long for the stiffness between the faces of a crack; give at most {:.6g} s, "
-                           "or leave it to time.cfl",
-                           c.time.dt, of_cracks));
+    errors.add(
+        {c.file.string(), 0}, "time.dt",
+        fmt::format("{:.6g} s is too long for the stiffness between the faces of a crack; give at most {:.6g} s, "
+                    "or leave it to time.cfl",
+                    c.time.dt, of_cracks));
   if (of_cracks < worth_telling * of_waves)
-    c.warnings.push_back(fmt::format("{}: the stiffness between the faces of a crack makes steps {:.2g} times shorter; "
-                                     "what is so stiff is nearly perfect: leave it out, or make it softer",
-                                     c.file.string(), of_waves / of_cracks));
+    c.warnings.push_back(
+        fmt::format("{}: the stiffness between the faces of a crack makes steps {:.2g} times shorter; "
+                    "what is so stiff is nearly perfect: leave it out, or make it softer",
+                    c.file.string(), of_waves / of_cracks));
   if (!(c.time.dt > near * first.crossing)) return;
   const std::string text =
       fmt::format("{:.6g} s is {:.3g} of the time that a wave and a point take through a cell at the start, {:.6g} s",

@@ -31,7 +31,8 @@ bool is_number(std::string_view text) {
 }  // namespace
 
 bool is_result_name(const std::string& name) {
-  for (const char* one : {"history.csv", "bodies.csv", "forces.csv", "tips.csv", "particles.hdf.series", failure_file, record_file})
+  for (const char* one :
+       {"history.csv", "bodies.csv", "forces.csv", "tips.csv", "particles.hdf.series", failure_file, record_file})
     if (name == one) return true;
   return std::ranges::any_of(numbered, [&](const Numbered& n) {
     return name.size() > n.start.size() + n.ending.size() && name.starts_with(n.start) && name.ends_with(n.ending) &&

@@ -120,8 +120,7 @@ void NeighbourExchange::start() {
     auto& words = outgoing_[i].words();
     if (words.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
       throw RankError("a message to a neighbour exceeds 16 GiB: use more ranks");
-    MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], tag_, comm_,
-              &requests_[i]);
+    MPI_Isend(words.data(), static_cast<int>(words.size()), MPI_DOUBLE, neighbours_[i], tag_, comm_, &requests_[i]);
     ++traffic_.messages;
     traffic_.bytes += static_cast<std::int64_t>(words.size()) * 8;
   }

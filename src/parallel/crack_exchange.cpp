@@ -48,8 +48,8 @@ CrackPoint<Dim> seen_across(const CrackPoint<Dim>& point, const Link<Dim>& link,
   return seen;
 }
 
-/// Puts points in the middle of segments that the material stretched to more than a cell. Every patch that knows both of
-/// a segment's points finds the same. The new ones stand for no length of a law: their neighbours keep theirs.
+/// Puts points in the middle of segments that the material stretched to more than a cell. Every patch that knows both
+/// of a segment's points finds the same. The new ones stand for no length of a law: their neighbours keep theirs.
 template <int Dim>
 void divide_long_segments(Patch<Dim>& patch, const Lattice<Dim>& lattice) {
   std::vector<CrackPoint<Dim>> divided;
@@ -84,7 +84,8 @@ void put_crack_point(const CrackPoint<Dim>& point, Message& message) {
   for (const double value : {point.bond.length, point.bond.peak[0], point.bond.peak[1], point.bond.dissipated})
     message.put(value);
   for (const std::int64_t word : std::bit_cast<ImageWords>(point.image)) message.put(word);
-  for (const Vec<Dim>& v : {point.plane, point.lower, point.upper, point.lower_velocity, point.upper_velocity, point.traction})
+  for (const Vec<Dim>& v :
+       {point.plane, point.lower, point.upper, point.lower_velocity, point.upper_velocity, point.traction})
     for (int d = 0; d < Dim; ++d) message.put(v[d]);
 }
 
@@ -100,8 +101,8 @@ CrackPoint<Dim> take_crack_point(const Message& message, std::size_t& at) {
   for (double* value : {&point.bond.length, &point.bond.peak[0], &point.bond.peak[1], &point.bond.dissipated})
     *value = *message.data(at++);
   point.image = std::bit_cast<Image>(ImageWords{message.integer(at), message.integer(at + 1)}), at += 2;
-  for (Vec<Dim>* v : {&point.plane, &point.lower, &point.upper, &point.lower_velocity, &point.upper_velocity,
-                      &point.traction})
+  for (Vec<Dim>* v :
+       {&point.plane, &point.lower, &point.upper, &point.lower_velocity, &point.upper_velocity, &point.traction})
     for (int d = 0; d < Dim; ++d) (*v)[d] = *message.data(at++);
   return point;
 }
@@ -211,8 +212,9 @@ void exchange_face_velocities(NeighbourExchange& messages, const PatchTable<Dim>
 }
 
 template <int Dim>
-void exchange_row_forces(NeighbourExchange& messages, const PatchTable<Dim>& table, const std::vector<Patch<Dim>>& patches,
-                         const Lattice<Dim>& lattice, std::vector<std::vector<RowForce<Dim>>>& forces) {
+void exchange_row_forces(NeighbourExchange& messages, const PatchTable<Dim>& table,
+                         const std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice,
+                         std::vector<std::vector<RowForce<Dim>>>& forces) {
   messages.begin();
   for (std::size_t p = 0; p < patches.size(); ++p)
     for (const auto& link : patches[p].links) {

@@ -212,7 +212,8 @@ void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lay
     for (std::int64_t i = 0; i < layout.cracks[layout.here[at]]; ++i, n += crack_numbers, bond += bond_numbers) {
       Patch<Dim>& patch = *patches[at];
       CrackPoint<Dim> point;
-      point.crack = n[0], point.index = n[1], point.next = n[2], point.filled = n[3] != 0, point.faces_filled = n[4] & 3;
+      point.crack = n[0], point.index = n[1], point.next = n[2], point.filled = n[3] != 0,
+      point.faces_filled = n[4] & 3;
       point.bond = {n[5] == Bond::holds || n[5] == Bond::broken ? Bond::State{n[5]} : Bond::none,
                     bond[0],
                     {bond[1], bond[2]},

@@ -8,11 +8,11 @@
 namespace cairn {
 namespace {
 
-constexpr double thinnest = 1.0;   // cells of material ahead of a tip that break at once
-constexpr double too_near = 0.5;   // cells between a tip and the crack that it joins
-constexpr double beyond = 0.05;    // cells by which it goes beyond that crack's line, so that none slips through
-constexpr double slope = 0.55;     // of the share of a full body across its surface, for each cell
-constexpr double own_line = 2.0;   // cells of its own line that a tip does not meet
+constexpr double thinnest = 1.0;  // cells of material ahead of a tip that break at once
+constexpr double too_near = 0.5;  // cells between a tip and the crack that it joins
+constexpr double beyond = 0.05;   // cells by which it goes beyond that crack's line, so that none slips through
+constexpr double slope = 0.55;    // of the share of a full body across its surface, for each cell
+constexpr double own_line = 2.0;  // cells of its own line that a tip does not meet
 
 /// Whether a tip's criterion is met; steady growth begins or goes on.
 bool is_driven(const GrowthSpec& growth, const TipState& tip, Crack& crack, double segment, double time) {
@@ -50,8 +50,7 @@ auto Simulation<Dim>::find_advances() -> std::vector<Advance> {
       if (crack.grown[tip.tip.end] + 0.999 * segment > growth.most) continue;
       if (!is_driven(growth, tip, crack, segment, time_)) continue;
       double angle = 0;
-      if (growth.direction == GrowthDirection::hoop)
-        angle = largest_hoop_stress(tip.K_opening, tip.K_sliding).angle;
+      if (growth.direction == GrowthDirection::hoop) angle = largest_hoop_stress(tip.K_opening, tip.K_sliding).angle;
       if (!std::isfinite(angle)) angle = 0;
       const Vec<2> ahead = tip.tip.ahead, left(-ahead.y(), ahead.x());
       advances.push_back({tip.tip.crack, tip.tip.end, std::cos(angle) * ahead + std::sin(angle) * left});
@@ -60,8 +59,8 @@ auto Simulation<Dim>::find_advances() -> std::vector<Advance> {
   return advances;
 }
 
-/// What lies ahead of the tips is known to the patch whose cells hold the place a cell ahead: other cracks, or the end of
-/// the body. Where there is no such patch, there is no material.
+/// What lies ahead of the tips is known to the patch whose cells hold the place a cell ahead: other cracks, or the end
+/// of the body. Where there is no such patch, there is no material.
 template <int Dim>
 void Simulation<Dim>::meet_obstacles(std::vector<Advance>& advances) {
   const double h = lattice_.smallest_spacing();
@@ -106,9 +105,8 @@ void Simulation<Dim>::advance(const Advance& to) {
   crack.ends[to.end] = now, crack.open[to.end] = to.open, crack.joined[to.end] = to.joined;
   crack.grown[to.end] += to.by.norm();
   for (auto& patch : patches_) {
-    const auto at = std::ranges::find_if(patch.cracks, [&](const CrackPoint<Dim>& p) {
-      return p.own && p.crack == to.crack && p.index == old;
-    });
+    const auto at = std::ranges::find_if(
+        patch.cracks, [&](const CrackPoint<Dim>& p) { return p.own && p.crack == to.crack && p.index == old; });
     if (at == patch.cracks.end()) continue;
     CrackPoint<Dim> point = *at;
     point.index = now, point.next = to.end == 0 ? old : now;

@@ -274,7 +274,8 @@ class Run {
     tables_.note_positions(state);
     share_rank_zero(state);
     state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
-    state.forces = forces_.state(), state.tips = tips_.state(), state.history = history_clock_.state(), state.checkpoint = checkpoints_.state();
+    state.forces = forces_.state(), state.tips = tips_.state(), state.history = history_clock_.state(),
+    state.checkpoint = checkpoints_.state();
     state.contacts_cleared = contacts_cleared_, state.contacts_kept = contacts_kept();
     state.series = particle_index_.entries();
     state.bodies = bodies_checksum(case_);
@@ -298,7 +299,8 @@ class Run {
 
   void restore(const RunState& state) {
     particles_.restore(state.particles), grains_.restore(state.grains), contacts_.restore(state.contacts);
-    forces_.restore(state.forces), tips_.restore(state.tips), history_clock_.restore(state.history), checkpoints_.restore(state.checkpoint);
+    forces_.restore(state.forces), tips_.restore(state.tips), history_clock_.restore(state.history),
+        checkpoints_.restore(state.checkpoint);
     book_.restore(state.energy);
     // Contacts that this run is the first to keep are summed from now on.
     contacts_cleared_ = contacts_kept() && !state.contacts_kept ? simulation_.time() : state.contacts_cleared;

@@ -102,9 +102,10 @@ void Simulation<Dim>::choose_time_step(double longest) {
         "m/s, point speed {:.6g} m/s); give a smaller time.dt, or leave it to time.cfl",
         steps_ + 1, limits_.dt, cell / speed, maxima_[0], maxima_[1]));
   if (limits_.dt > traction_dt_)
-    throw RunError(fmt::format("step {}: time.dt = {:.6g} s is too long for the stiffness between the faces of a crack; "
-                               "give at most {:.6g} s, or leave it to time.cfl",
-                               steps_ + 1, limits_.dt, traction_dt_));
+    throw RunError(
+        fmt::format("step {}: time.dt = {:.6g} s is too long for the stiffness between the faces of a crack; "
+                    "give at most {:.6g} s, or leave it to time.cfl",
+                    steps_ + 1, limits_.dt, traction_dt_));
   if (speed > 0 || dt_ == 0) dt_ = limits_.dt > 0 ? limits_.dt : limits_.cfl * cell / speed;  // else no point is left
   if (!(dt_ > 0) || !std::isfinite(dt_))
     throw RunError(fmt::format("step {}: the time step collapsed (wave speed {} m/s, point speed {} m/s)", steps_ + 1,

@@ -1,5 +1,5 @@
-// Parts that cracks cut off become bodies of their own: contact between bodies takes over, which knows them wherever they
-// go, and the cracks between them are forgotten.
+// Parts that cracks cut off become bodies of their own: contact between bodies takes over, which knows them wherever
+// they go, and the cracks between them are forgotten.
 //
 // A body hangs together by its rows of nodes: all rows that one material point touches belong to one part. Rows on the
 // two sides of a crack are one where its faces are bound: by their law, or by crack points that hold each other.
@@ -170,10 +170,14 @@ void Simulation<Dim>::split_bodies() {
       if (!cut.contains(piece.body) || piece.points.size() == 0) continue;
       if (patches_[p].cracks.empty()) lay_out(patches_[p], piece);
       piece.projected = false;
-      auto& here = parts[p].emplace(piece.body, PieceParts<Dim>(piece, lattice_, united_sides<Dim>(patches_[p], piece, lattice_, contact_))).first->second;
+      auto& here = parts[p]
+                       .emplace(piece.body, PieceParts<Dim>(piece, lattice_,
+                                                            united_sides<Dim>(patches_[p], piece, lattice_, contact_)))
+                       .first->second;
       std::set<std::int64_t> told;
       here.for_rows([&](const Index<Dim>& place, SideSet sides, std::int64_t label) {
-        const bool shared = std::ranges::any_of(patches_[p].overlaps, [&](const auto& box) { return box.contains(place); });
+        const bool shared =
+            std::ranges::any_of(patches_[p].overlaps, [&](const auto& box) { return box.contains(place); });
         if (shared || told.insert(label).second)
           rows.insert(rows.end(), {piece.body, name_of_node<Dim>(lattice_, place), sides.key(), label});
       });
@@ -234,10 +238,9 @@ void Simulation<Dim>::spare_parted(const std::vector<int>& bodies) {
       lay_out(patch, piece);
       std::vector<SideSet> sides;
       for (const auto& row : piece.nodes.further.rows) sides.push_back(row.sides);
-      PieceParts<Dim>(piece, lattice_, sides)
-          .for_rows([&](const Index<Dim>& place, SideSet here, std::int64_t) {
-            mine.insert(mine.end(), {piece.body, name_of_node<Dim>(lattice_, place), here.key()});
-          });
+      PieceParts<Dim>(piece, lattice_, sides).for_rows([&](const Index<Dim>& place, SideSet here, std::int64_t) {
+        mine.insert(mine.end(), {piece.body, name_of_node<Dim>(lattice_, place), here.key()});
+      });
     }
   const auto all = gather_on_all(mine, comm_);
   std::set<RowName> rows;
@@ -271,13 +274,16 @@ template <int Dim>
 std::vector<double> Simulation<Dim>::spared() const {
   std::vector<double> pairs;
   for (std::size_t k = 0; k < cracks_.size(); ++k)
-    for (const int body : cracks_[k].spared) pairs.insert(pairs.end(), {static_cast<double>(k), static_cast<double>(body)});
+    for (const int body : cracks_[k].spared)
+      pairs.insert(pairs.end(), {static_cast<double>(k), static_cast<double>(body)});
   return pairs;
 }
 
 template <int Dim>
 void Simulation<Dim>::restore_parts(const std::vector<double>& parts, const std::vector<double>& spared) {
-  const auto is_below = [](double x, std::size_t n) { return x >= 0 && x < static_cast<double>(n) && x == std::floor(x); };
+  const auto is_below = [](double x, std::size_t n) {
+    return x >= 0 && x < static_cast<double>(n) && x == std::floor(x);
+  };
   bool whole = parts.empty() || !cracks_.empty();
   for (std::size_t i = 0; whole && i < parts.size(); ++i) {
     whole = is_below(parts[i], bodies_.size());
@@ -291,10 +297,10 @@ void Simulation<Dim>::restore_parts(const std::vector<double>& parts, const std:
   if (!cracks_.empty()) tell_contact_of_cracks();
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                              \
-  template void Simulation<Dim>::split_bodies();                                                            \
-  template void Simulation<Dim>::tell_contact_of_cracks();                                                  \
-  template std::vector<double> Simulation<Dim>::spared() const;                                             \
+#define CAIRN_INSTANTIATE(Dim)                                  \
+  template void Simulation<Dim>::split_bodies();                \
+  template void Simulation<Dim>::tell_contact_of_cracks();      \
+  template std::vector<double> Simulation<Dim>::spared() const; \
   template void Simulation<Dim>::restore_parts(const std::vector<double>&, const std::vector<double>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -140,12 +140,12 @@ void Simulation<Dim>::exchange_tractions() {
   if (!traction_laws_.empty()) exchange_row_forces(*traction_messages_, table_, patches_, lattice_, row_forces_);
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                    \
-  template void Simulation<Dim>::define_tractions(const Case&);                                   \
-  template void Simulation<Dim>::bind_faces(const Case&);                                         \
-  template void Simulation<Dim>::follow_openings();                                               \
-  template std::array<double, 2> Simulation<Dim>::energies_of(const CrackPoint<Dim>&) const;      \
-  template void Simulation<Dim>::find_tractions(std::size_t);                                     \
+#define CAIRN_INSTANTIATE(Dim)                                                               \
+  template void Simulation<Dim>::define_tractions(const Case&);                              \
+  template void Simulation<Dim>::bind_faces(const Case&);                                    \
+  template void Simulation<Dim>::follow_openings();                                          \
+  template std::array<double, 2> Simulation<Dim>::energies_of(const CrackPoint<Dim>&) const; \
+  template void Simulation<Dim>::find_tractions(std::size_t);                                \
   template void Simulation<Dim>::exchange_tractions();
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

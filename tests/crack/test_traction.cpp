@@ -71,8 +71,8 @@ TEST(Traction, WorkIsStoredAndDissipated) {
       const double u = 200 / 50e6;
       Bond bond = holding();
       double work = 0, before = 0;
-      const std::vector<TractionLaw::Modes> path = {{0, 0},           {0.5 * u, 0},       {0.1 * u, 0.2 * u},
-                                                    {0.6 * u, -u},    {-0.1 * u, 0.3 * u}, {1.3 * u, 1.5 * u},
+      const std::vector<TractionLaw::Modes> path = {{0, 0},          {0.5 * u, 0},        {0.1 * u, 0.2 * u},
+                                                    {0.6 * u, -u},   {-0.1 * u, 0.3 * u}, {1.3 * u, 1.5 * u},
                                                     {9 * u, 1.5 * u}};
       for (std::size_t i = 0; i + 1 < path.size(); ++i) {
         work += work_along(law, bond, {path[i], path[i + 1]});

@@ -78,7 +78,8 @@ TEST(Growth, ATipEndsAtAnotherCrack) {
 TEST(Growth, SteadyGrowthHasItsSpeedAndEnd) {
   Case c = torn_disk(30, 0.3);
   GrowthSpec& growth = c.cracks[0].growth;
-  growth.criterion = GrowthCriterion::steady, growth.energy = 0, growth.speed = 0.8, growth.start = 0.05, growth.most = 0.2;
+  growth.criterion = GrowthCriterion::steady, growth.energy = 0, growth.speed = 0.8, growth.start = 0.05,
+  growth.most = 0.2;
   Simulation<2> simulation(c, MPI_COMM_SELF);
   double slowest = 1e300, fastest = 0;
   while (simulation.time() < 0.4) {

@@ -101,9 +101,10 @@ TEST(Tractions, HalvesPulledApartTakeTheEnergyOfTheLaw) {
       const Totals t = simulation.totals();
       const double G = law.energy[0] * 6, share = shape == CohesiveShape::exponential ? 1 - 9 * std::exp(-8.0) : 1;
       const double work = t.boundary_work - t.kinetic - t.strain;
-      std::printf("%s, shape %d: crack's work %.4f of G_c A, grips' %.4f, peak stress %.4f, book off by %.4f of G_c A\n",
-                  shear ? "shear" : "tension", static_cast<int>(shape), t.crack_dissipation / G, work / G,
-                  peak / law.strength[0], worst / G);
+      std::printf(
+          "%s, shape %d: crack's work %.4f of G_c A, grips' %.4f, peak stress %.4f, book off by %.4f of G_c A\n",
+          shear ? "shear" : "tension", static_cast<int>(shape), t.crack_dissipation / G, work / G,
+          peak / law.strength[0], worst / G);
       EXPECT_NEAR(t.crack_dissipation / G, share, 0.002);
       EXPECT_NEAR(work / G, 1, 0.03);
       EXPECT_NEAR(peak / law.strength[0], 1, 0.04);
@@ -128,9 +129,8 @@ TEST(Tractions, PerfectDirectionsAreBound) {
     (slip ? half.cracks[0].interface.sliding : half.cracks[0].interface.opening) = 100;
     half.domain.gravity = Vec3::Zero(), half.bodies[0].angular_velocity = Vec3::Zero();
     Simulation<2> simulation(half, MPI_COMM_SELF);
-    set_velocities(simulation, [](const Vec<2>& x) -> Vec<2> {
-      return x.y() > 0.503 ? Vec<2>(0.02, 0.02) : Vec<2>(-0.02, -0.02);
-    });
+    set_velocities(simulation,
+                   [](const Vec<2>& x) -> Vec<2> { return x.y() > 0.503 ? Vec<2>(0.02, 0.02) : Vec<2>(-0.02, -0.02); });
     for (int i = 0; i < 100; ++i) simulation.step(1e300);
     double opening = 0, slipped = 0;
     for (const auto& patch : simulation.patches())

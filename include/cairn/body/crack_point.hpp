@@ -13,9 +13,9 @@ namespace cairn {
 struct Bond {
   enum State : std::int32_t { none, holds, broken };
   State state = none;
-  double length = 0;                   // of the crack that the point stands for [m]
-  std::array<double, 2> peak = {0, 0}; // largest opening and slip so far [m]
-  double dissipated = 0;               // where it is broken [J/m2]
+  double length = 0;                    // of the crack that the point stands for [m]
+  std::array<double, 2> peak = {0, 0};  // largest opening and slip so far [m]
+  double dissipated = 0;                // where it is broken [J/m2]
 };
 
 /// A point of a crack. The plane lies between the two faces, which begin in one place and move with the material on
@@ -35,7 +35,7 @@ struct CrackPoint {
   Vec<Dim> upper = Vec<Dim>::Zero();  // face above [m]
   Vec<Dim> lower_velocity = Vec<Dim>::Zero(), upper_velocity = Vec<Dim>::Zero();  // in the last step [m/s]
 
-  Bond bond;                          // what its faces do to each other
+  Bond bond;                             // what its faces do to each other
   Vec<Dim> traction = Vec<Dim>::Zero();  // on the lower face, that on the upper is its opposite [Pa]
 
   static constexpr int filled_bit(int side) { return side > 0 ? 2 : 1; }
@@ -53,7 +53,9 @@ struct CrackPoint {
     return std::tie(a.crack, a.image, a.index) < std::tie(b.crack, b.image, b.index);
   }
   /// Whether b comes next on the same line.
-  bool precedes(const CrackPoint& b) const { return crack == b.crack && image == b.image && next == b.index && index != next; }
+  bool precedes(const CrackPoint& b) const {
+    return crack == b.crack && image == b.image && next == b.index && index != next;
+  }
 };
 
 /// The cracks that the straight line from a point to a node crosses, at most three, as one number that orders them.

@@ -51,9 +51,9 @@ struct FaceMotion {
 };
 
 /// Gives the patch's own crack points the velocities of their faces, from those that strains see in the step: forces do
-/// their work by them. With those that move the material instead, nodes' accelerations that no point sees would move the
-/// faces against their tractions, and make energy. Of wide cracks a face may lie with a neighbour: returns what this patch knows of faces of others'
-/// points.
+/// their work by them. With those that move the material instead, nodes' accelerations that no point sees would move
+/// the faces against their tractions, and make energy. Of wide cracks a face may lie with a neighbour: returns what
+/// this patch knows of faces of others' points.
 template <int Dim>
 std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& points,
                                                   const CrackSurroundings<Dim>& around);
@@ -70,9 +70,9 @@ struct RowForce {
 };
 
 /// The tractions of the crack points whose faces lie among the patch's nodes, as forces on rows; with complete masses
-/// and the momenta that strains see at the start of the step. Tractions are those of the opening `ahead` [s] later, where
-/// strains see the stress as well: so that the faces' motion and the forces are a leapfrog.
-/// \param traction  of a crack point with some opening, on its lower face [Pa]
+/// and the momenta that strains see at the start of the step. Tractions are those of the opening `ahead` [s] later,
+/// where strains see the stress as well: so that the faces' motion and the forces are a leapfrog. \param traction  of a
+/// crack point with some opening, on its lower face [Pa]
 template <int Dim>
 std::vector<RowForce<Dim>> find_row_forces(
     const CrackSurroundings<Dim>& around, double ahead,

@@ -39,14 +39,14 @@ enum class GrowthDirection { straight, hoop };
 struct GrowthSpec {
   GrowthCriterion criterion = GrowthCriterion::none;
   GrowthDirection direction = GrowthDirection::straight;
-  double toughness = 0;   // K_Ic [Pa m^1/2], of hoop
-  double energy = 0;      // J_c [J/m2], of energy; of steady: at which it starts, 0: at `start`
-  double speed = 0;       // of steady [m/s]
-  double start = 0;       // of steady [s]
+  double toughness = 0;  // K_Ic [Pa m^1/2], of hoop
+  double energy = 0;     // J_c [J/m2], of energy; of steady: at which it starts, 0: at `start`
+  double speed = 0;      // of steady [m/s]
+  double start = 0;      // of steady [s]
   double most = std::numeric_limits<double>::infinity();  // growth of a tip at which it ends [m]
-  double length = 0.5;    // of a new segment [cells]
-  int every = 5;          // steps
-  bool cohesive = false;  // the new segment has the crack's cohesive law
+  double length = 0.5;                                    // of a new segment [cells]
+  int every = 5;                                          // steps
+  bool cohesive = false;                                  // the new segment has the crack's cohesive law
 };
 
 struct CrackSpec {
@@ -54,8 +54,8 @@ struct CrackSpec {
   std::array<CrackEnd, 2> ends = {CrackEnd::open, CrackEnd::open};
   CrackLaw law = CrackLaw::friction;
   double friction = 0.3;
-  InterfaceSpec interface;          // of law interface
-  CohesiveSpec cohesive;            // of law cohesive, and of what grows
+  InterfaceSpec interface;  // of law interface
+  CohesiveSpec cohesive;    // of law cohesive, and of what grows
   GrowthSpec growth;
   std::vector<std::string> groups;  // of the bodies that it cuts
   std::vector<int> ids;             // or those bodies; both empty: all that are not rigid

@@ -9,14 +9,14 @@ namespace cairn {
 
 /// What every rank knows of a crack.
 struct Crack {
-  std::array<int, 2> ends = {0, 0};         // indices of its first and last point
-  std::array<bool, 2> open = {true, true};  // the first and last end: at or beyond a body's surface, or joined
+  std::array<int, 2> ends = {0, 0};             // indices of its first and last point
+  std::array<bool, 2> open = {true, true};      // the first and last end: at or beyond a body's surface, or joined
   std::array<bool, 2> joined = {false, false};  // to another crack that it ran into
   std::array<double, 2> grown = {0, 0};         // lengths by which the ends grew [m]
   std::array<double, 2> since = {-1, -1};       // when steady growth began [s]; -1: not yet
-  bool all_bodies = true;                   // cuts every body that is not rigid
-  std::vector<int> bodies;                  // else those that it cuts
-  static constexpr int state_size = 10;  // what changes in a run
+  bool all_bodies = true;                       // cuts every body that is not rigid
+  std::vector<int> bodies;                      // else those that it cuts
+  static constexpr int state_size = 10;         // what changes in a run
   void state_of(double* to) const {
     for (const int e : {0, 1}) *to++ = ends[e], *to++ = open[e], *to++ = joined[e], *to++ = grown[e], *to++ = since[e];
   }

@@ -2,9 +2,9 @@
 /// Laws of imperfect interfaces and cohesive zones: tractions T between the faces of a crack from its opening, at crack
 /// points (docs/cracks.md). d[0] is the opening along the normal, negative where faces overlap, d[1] the slip [m].
 ///
-/// Interface (Nairn, CMES 92, 2013): T = D d. Cohesive (Nairn 2013, section 2.8): in each mode, with the largest opening
-/// d_m so far, T = T(d_m) d/d_m, back to the origin; no normal traction where the faces are closed. It breaks for good
-/// where d_m reaches the critical opening in a mode or, with an exponent n, where
+/// Interface (Nairn, CMES 92, 2013): T = D d. Cohesive (Nairn 2013, section 2.8): in each mode, with the largest
+/// opening d_m so far, T = T(d_m) d/d_m, back to the origin; no normal traction where the faces are closed. It breaks
+/// for good where d_m reaches the critical opening in a mode or, with an exponent n, where
 ///   (G_n/G_nc)^n + (G_t/G_tc)^n >= 1,    G = int_0^d_m T(d) dd.
 /// Energies per area: stored T d/2 in each mode; dissipated G - T(d_m) d_m/2, and what was stored when it broke.
 
@@ -44,7 +44,9 @@ struct BrittleLaw {
 struct ExponentialLaw {
   double strength, scale, critical;
   double traction(double d) const { return strength * d / scale * std::exp(1 - d / scale); }
-  double area(double d) const { return std::exp(1.0) * strength * scale * (1 - (1 + d / scale) * std::exp(-d / scale)); }
+  double area(double d) const {
+    return std::exp(1.0) * strength * scale * (1 - (1 + d / scale) * std::exp(-d / scale));
+  }
   double stiffness() const { return std::exp(1.0) * strength / scale; }
 };
 

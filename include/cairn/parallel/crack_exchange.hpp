@@ -30,8 +30,9 @@ void exchange_face_velocities(NeighbourExchange& messages, const PatchTable<Dim>
 /// Gives every patch the forces that neighbours' crack points put on its nodes, beside its own, in the order in which
 /// they are added; `forces` for each patch. Collective.
 template <int Dim>
-void exchange_row_forces(NeighbourExchange& messages, const PatchTable<Dim>& table, const std::vector<Patch<Dim>>& patches,
-                         const Lattice<Dim>& lattice, std::vector<std::vector<RowForce<Dim>>>& forces);
+void exchange_row_forces(NeighbourExchange& messages, const PatchTable<Dim>& table,
+                         const std::vector<Patch<Dim>>& patches, const Lattice<Dim>& lattice,
+                         std::vector<std::vector<RowForce<Dim>>>& forces);
 
 /// Puts a crack point into a message, and takes it from there.
 template <int Dim>

@@ -174,10 +174,10 @@ class Simulation {
   void accelerate_points(Patch<Dim>& patch);
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
   void finish_points(Patch<Dim>& patch, double share);
-  void receive_points();  // communicates
+  void receive_points();      // communicates
   void exchange_tractions();  // communicates, where faces of cracks pull each other; before complete_forces
-  void move_cracks();     // communicates, where there are any
-  void receive_cracks();  // likewise
+  void move_cracks();         // communicates, where there are any
+  void receive_cracks();      // likewise
 
   // Between the stages: how tools move in the step (tools.cpp).
   void begin_tools();
@@ -330,17 +330,17 @@ class Simulation {
   std::vector<bool> beside_others_;        // for each patch: a neighbour lives on another rank
   std::vector<ContactSweep<Dim>> sweeps_;  // for each patch
   std::vector<Crack> cracks_;
-  std::vector<CrackSegments<Dim>> segments_;                // for each patch
-  std::vector<std::vector<FaceMotion<Dim>>> face_motions_;  // for each patch: of its neighbours' crack points
-  std::vector<std::optional<TractionLaw>> traction_laws_;   // for each crack; empty where none has one
-  std::vector<std::vector<RowForce<Dim>>> row_forces_;      // for each patch: of tractions
+  std::vector<CrackSegments<Dim>> segments_;                      // for each patch
+  std::vector<std::vector<FaceMotion<Dim>>> face_motions_;        // for each patch: of its neighbours' crack points
+  std::vector<std::optional<TractionLaw>> traction_laws_;         // for each crack; empty where none has one
+  std::vector<std::vector<RowForce<Dim>>> row_forces_;            // for each patch: of tractions
   double traction_dt_ = std::numeric_limits<double>::infinity();  // longest step for which they are stable [s]
-  int split_every_ = 0;                                            // steps; 0: parts stay in their body
-  std::vector<double> parts_;                                      // bodies that those behind the case's came from
-  std::vector<GrowthSpec> growth_;                                 // of each crack
-  std::vector<Material> specs_;                             // of materials, where there are cracks
-  std::array<double, 2> j_radius_{};                        // [cells]
-  std::vector<double> crack_densities_;                     // of bodies; 0 for rigid ones [kg/m3]
+  int split_every_ = 0;                                           // steps; 0: parts stay in their body
+  std::vector<double> parts_;                                     // bodies that those behind the case's came from
+  std::vector<GrowthSpec> growth_;                                // of each crack
+  std::vector<Material> specs_;                                   // of materials, where there are cracks
+  std::array<double, 2> j_radius_{};                              // [cells]
+  std::vector<double> crack_densities_;                           // of bodies; 0 for rigid ones [kg/m3]
   std::unique_ptr<NeighbourExchange> messages_, traction_messages_;
   std::unique_ptr<NodeExchange<Dim>> exchange_;
   std::unique_ptr<Migration<Dim>> migration_;
