@@ -18,7 +18,7 @@ template <int Dim>
 std::map<std::pair<int, Index<Dim>>, NodeValues<Dim>> naive_sums(const World<Dim>& world,
                                                                  const std::vector<GlobalPoint<Dim>>& points) {
   std::map<std::pair<int, Index<Dim>>, NodeValues<Dim>> sums;
-  const Formula shape = formula_of(ShapeFunction::gimp, {0.25, 0.25, 0.25});
+  const test::Formula shape = formula_of(ShapeFunction::gimp, {0.25, 0.25, 0.25});
   const Vec<Dim> gravity = Vec<Dim>::Constant(-3);
   for (const auto& point : points) {
     Box<Dim> near;

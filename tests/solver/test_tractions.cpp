@@ -127,7 +127,7 @@ TEST(Tractions, PerfectDirectionsAreBound) {
     Case half = whole;
     add_crack(half, {Vec3(0.1, 0.503, 0), Vec3(0.9, 0.503, 0)}, CrackLaw::interface);
     (slip ? half.cracks[0].interface.sliding : half.cracks[0].interface.opening) = 100;
-    half.domain.gravity = Vec3::Zero(), half.bodies[0].angular_velocity = Vec3::Zero();
+    half.domain.gravity = Vec3(Vec3::Zero()), half.bodies[0].angular_velocity = Vec3::Zero();
     Simulation<2> simulation(half, MPI_COMM_SELF);
     set_velocities(simulation,
                    [](const Vec<2>& x) -> Vec<2> { return x.y() > 0.503 ? Vec<2>(0.02, 0.02) : Vec<2>(-0.02, -0.02); });
