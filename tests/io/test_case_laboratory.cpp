@@ -8,7 +8,7 @@ namespace {
 
 using namespace test;
 
-const std::string laboratory = replaced(base, "end = 0.1", "end = 0.1\nuntil = { packing = 0.5, falls = true, every = 3 }") + R"(
+const std::string laboratory = replaced(base, "end = 0.1", "end = 0.1\nuntil = { packing = 0.5, falls = true, every = 3 }") + R"toml(
 [[bodies]]
 shape = { type = "box", lower = [0.3, 0.8], upper = [0.7, 0.9] }
 material = "soft"
@@ -47,7 +47,7 @@ set.boundary.top.servo.force = 7.0
 set.drive.0.servo.force = [[0.0, 1.0], [0.1, 2.0]]
 set.output.forces = { interval = 0.5 }
 set.damping.local = 0.5
-)";
+)toml";
 
 TEST_F(CaseFile, LaboratoriesReadBackToTheSameCase) {
   write("more.csv", "x,y,r\n0.2,0.6,0.05\n");
