@@ -20,8 +20,8 @@ def faces(run: Run, frame: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
     with reading(path), h5py.File(path, "r") as file:
         crack, index, image = file["crack"][()], file["index"][()], file["image"][()]
         lower, upper = file["lower"][()][:, :2], file["upper"][()][:, :2]
-    lines = []
         parted = file["parted"][()]
+    lines = []
     order = np.lexsort((index, image[:, 1], image[:, 0], crack))
     order = order[parted[order] == 0]
     key = np.column_stack([crack, image[:, :2]])[order]

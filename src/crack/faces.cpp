@@ -60,7 +60,12 @@ RowState<Dim> state_of(const CrackSurroundings<Dim>& around, int crack, const In
     const double density = around.densities[piece.body];
     const double mass = nodes.sums[static_cast<std::size_t>(row) * NodeSums<Dim>::width];
     state.mass += mass, state.fill += mass / (density * around.lattice.cell_volume());
-    if (!nodes.motion.empty()) state.momentum += strain_momentum(nodes, row, mass, around.update);
+    // Where tractions are found the arrays may be those of the step before, on another box: only masses are asked for.
+    const auto end = static_cast<std::size_t>(row) + 1;
+    const bool by_velocity = around.update != StressUpdate::first && around.update != StressUpdate::last;
+    if (nodes.motion.size() >= end * NodeMotion<Dim>::width &&
+        (!by_velocity || nodes.velocity.size() >= end * vector_width))
+      state.momentum += strain_momentum(nodes, row, mass, around.update);
   }
   return state;
 }

@@ -254,6 +254,10 @@ void Simulation<Dim>::spare_parted(const std::vector<int>& bodies) {
       if (rows.contains({row.body, row.place, SideSet(row.sides).without(c).key()}))
         across.insert({static_cast<int>(row.body), c});
     }
+  // A crack without tips cuts nothing anew: it is done with parts that it lies away from too.
+  for (const int body : bodies)
+    for (std::size_t c = 0; c < cracks_.size(); ++c)
+      if (cracks_[c].open[0] && cracks_[c].open[1]) beside.insert({body, static_cast<int>(c)});
   for (const auto& [body, c] : beside)
     if (!across.contains({body, c}) && cracks_[c].cuts(body)) cracks_[c].spared.push_back(body);
 }

@@ -8,7 +8,8 @@ namespace {
 
 using namespace test;
 
-const std::string laboratory = replaced(base, "end = 0.1", "end = 0.1\nuntil = { packing = 0.5, falls = true, every = 3 }") + R"toml(
+const std::string laboratory =
+    replaced(base, "end = 0.1", "end = 0.1\nuntil = { packing = 0.5, falls = true, every = 3 }") + R"toml(
 [[bodies]]
 shape = { type = "box", lower = [0.3, 0.8], upper = [0.7, 0.9] }
 material = "soft"
@@ -96,11 +97,11 @@ TEST_F(CaseFile, LaboratoriesThatCannotBeAreRefused) {
   };
   refuse("drive.0.velocity", "[\"0.1 *\", 0.0]", "--set drive.0.velocity", "is no formula of t");
   refuse("drive.0.velocity", "[\"ln(t - 1)\", 0.0]", "--set drive.0.velocity", "write one such as");
-  refuse("drive.0.servo.gain", "0.0", "--set drive.0.servo.gain", "above 0");
-  refuse("time.until.packing", "-1.0", "--set time.until.packing", "above 0");
-  refuse("stage.1.until.of", "\"roof\"", "--set stage.1.until.of", "choose one of left, top, lid");
+  refuse("drive.0.servo.gain", "0.0", "--set drive.0.servo.gain", "greater than 0");
+  refuse("time.until.packing", "-1.0", "--set time.until.packing", "greater than 0");
+  refuse("stage.0.until.of", "\"roof\"", "--set stage.0.until.of", "choose one of left, top, lid");
   refuse("stage.0.set.domain.cells", "[4, 4]", "case.toml", "domain.cells cannot change in a run");
-  refuse("stage.0.set.contact.friction", "-0.5", "--set stage.0.set.contact.friction", "at least 0");
+  refuse("stage.0.set.contact.friction", "-0.5", "case.toml", "contact.friction: -0.5");
   refuse("damping.viscous", "-1.0", "--set damping.viscous", "at least 0");
   refuse("insert.0.region.upper", "[0.15, 0.4]", "case.toml", "is too small");
   refuse("insert.0.count", "0", "--set insert.0.count", "in [1");

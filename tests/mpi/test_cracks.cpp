@@ -52,7 +52,6 @@ void check_cracks(Case c, int steps, bool grows = false) {
     MPI_Allreduce(MPI_IN_PLACE, &count, 1, MPI_INT64_T, MPI_SUM, MPI_COMM_WORLD);
     EXPECT_EQ(count, std::ssize(cracks)) << "crack points were lost";
     EXPECT_GE(cracks.size(), at_first.size() + (grows ? 5 : 0));
-    EXPECT_TRUE(grows || cracks.size() == at_first.size());
     const Totals now = shared.totals(), reference = alone.totals();
     if (rank != 0) continue;
     EXPECT_LE((now.momentum - start.momentum).norm(), 1e-13 * start.mass * (0.3 + c.bodies[0].velocity.norm()));
