@@ -38,7 +38,7 @@ def main() -> int:
     here.mkdir()
 
     commands = re.findall(r"^  ([a-z][a-z-]*) +[A-Z]", cairn("--help").out, re.MULTILINE)
-    expect(len(commands) == 13, f"commands: {commands}")
+    expect(len(commands) == 15, f"commands: {commands}")
     expect(f"Manual: {prefix}/share/doc/cairn" in cairn("--help").out, cairn("--help").out)
     pages = prefix / "share" / "doc" / "cairn"
     for page in [*(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "LICENSE"]:
