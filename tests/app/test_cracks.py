@@ -101,7 +101,7 @@ def differences(a: Path, b: Path) -> list[str]:
 
 def check_growth(cairn: Program, case: Path, scratch: Path) -> list[str]:
     """Laws, growth and split on several ranks, and from a checkpoint in the middle of them on another number."""
-    settings = SETTINGS | {"time.steps": 100, "output.checkpoint": "{ every = 40, keep = 5 }",
+    settings = SETTINGS | {"time.steps": 160, "output.checkpoint": "{ every = 40, keep = 5 }",
                            "output.tips": "{ every = 10 }"}
     failures = []
     for ranks in (1, 2, 3, 5):
@@ -112,23 +112,23 @@ def check_growth(cairn: Program, case: Path, scratch: Path) -> list[str]:
             different = differences(scratch / "growing_1", scratch / f"growing_{ranks}")
             failures += [f"growth on {ranks} ranks: {line}" for line in different[:5]]
     one = scratch / "growing_1"
-    with h5py.File(one / "particles_000005.vtkhdf") as file:
+    with h5py.File(one / "particles_000008.vtkhdf") as file:
         bodies = np.unique(file["VTKHDF/PointData/body"][:] if "VTKHDF" in file else file["body"][:])
-    if len(bodies) != 3:
-        failures.append(f"the disk that was cut is not two bodies: {bodies}")
-    with h5py.File(one / "cracks_000005.h5") as file:
+    if len(bodies) < 3:
+        failures.append(f"what was cut through is one body still: {bodies}")
+    with h5py.File(one / "cracks_000008.h5") as file:
         if not (file["bond"][:] == 2).any() or not (file["dissipated"][:].sum() > 0):
             failures.append("no cohesive law broke")
     tips = (one / "tips.csv").read_text().splitlines()
     if len(tips) < 5 or float(tips[4].split(",")[8]) <= 0:
         failures.append(f"tips.csv: {tips[:5]}")
-    for ranks, checkpoint in ((3, 0), (2, 1)):
+    for ranks, checkpoint in ((3, 0), (2, 2)):
         out = scratch / f"growing_on_{ranks}"
         done = cairn("run", case, "--out", out, "--restart", one / f"checkpoint_{checkpoint:06}.h5", *sets(settings),
                      ranks=ranks, timeout=300)
         if done.code != 0:
             return [*failures, f"restart in growth: exit code {done.code}: {done.err}"]
-        for name in ("particles_000005.vtkhdf", "cracks_000005.h5"):
+        for name in ("particles_000008.vtkhdf", "cracks_000008.h5"):
             failures += [f"restart in growth: {name}: {line}"
                          for line in compare_runs.compare_files(one / name, out / name)]
     return failures
@@ -144,9 +144,10 @@ def check_same_bits(cairn: Program, case: Path, scratch: Path) -> list[str]:
             different = differences(scratch / "ranks_1", scratch / f"ranks_{ranks}")
             failures += [f"on {ranks} ranks: {line}" for line in different[:5]]
     first, last = (crack_rows(scratch / "ranks_1", f"cracks_{n:06}.h5") for n in (0, 3))
-    if first.shape != last.shape or not np.array_equal(first[:, :2], last[:, :2]):
-        failures.append("crack points came or went")
-    elif not 1e-4 < np.abs(first[:, 2:] - last[:, 2:]).max() < 0.5:
+    if len(last) < len(first):  # segments longer than a cell divide
+        failures.append("crack points went")
+    short_first, short_last = (rows[rows[:, 0] == 2, 2:] for rows in (first, last))  # none of its segments divides
+    if not 1e-4 < np.abs(short_first - short_last).max() < 0.5:
         failures.append("the cracks did not go with the disks")
     if not np.abs(last[:, 2:5] - last[:, 5:8]).max() > 1e-5:
         failures.append("no crack opened or slipped")
