@@ -119,7 +119,7 @@ class Run {
     display.finish();
     const Totals totals = simulation_.totals();
     if (rank_ == 0) tell_departures(totals);
-    if (!ended_.empty())
+    if (rank_ == 0 && !ended_.empty())
       say(stdout, "ended at step {}, time {} s: {}\n", simulation_.steps(), simulation_.time(), ended_);
     report(step_wall);
     return done;
