@@ -16,11 +16,11 @@ namespace cairn::app {
 namespace {
 
 // What a run holds, from measurements (VmHWM) of runs of 7e3 to 1e6 points (tests/app/test_memory.py).
-constexpr double base_bytes = 24e6;     // of a rank: program, MPI, HDF5
+constexpr double base_bytes = 27e6;     // of a rank: program, MPI, HDF5
 constexpr double message_copies = 3;    // of what patches exchange: sent and received, with room for more
 constexpr double contact_bytes = 550;   // of a node of two bodies
 constexpr double writing_bytes = 10e6;  // of HDF5 at work
-constexpr double site_bytes = 32;       // while round surfaces are cut
+constexpr double site_bytes = 64;       // while round surfaces are cut
 
 double bytes_of_point(const Material& material, int dimension) {
   const std::size_t states =
