@@ -16,7 +16,9 @@
 #include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/output.hpp"
 #include "history_tables.hpp"
+#include "output_clocks.hpp"
 #include "restart.hpp"
+#include "run_report.hpp"
 #include "stage_keeper.hpp"
 #include "stop_signal.hpp"
 
@@ -53,19 +55,13 @@ class Run {
         roll_call_(comm),
         start_(wall_clock()),
         simulation_(c, comm, from),
-        particles_(c.output.particles),
-        grains_(c.output.grains),
-        contacts_(c.output.contacts),
-        forces_(c.output.forces),
-        tips_(c.output.tips),
-        history_clock_(c.output.history),
-        checkpoints_(c.output.checkpoint),
+        clocks_(c.output),
         particle_index_(settings.out / "particles.hdf.series"),
-        tables_(settings.out, c.output.track, writes_forces(c), c.output.tips.active()),
+        tables_(settings.out, c.output.track, is_ever_active(c, &Output::forces), is_ever_active(c, &Output::tips)),
         book_(energy_that_matters(c)) {
     MPI_Comm_rank(comm_, &rank_);
     MPI_Comm_size(comm_, &ranks_);
-    note_wall();
+    needs_wall_ = needs_wall_time(c.output);
     if (from) restore(from->state());
     simulation_.ask([this] { return notice(); });
     stages_.note_start(simulation_);
@@ -121,7 +117,7 @@ class Run {
     if (rank_ == 0) tell_departures(totals);
     if (rank_ == 0 && !ended_.empty())
       say(stdout, "ended at step {}, time {} s: {}\n", simulation_.steps(), simulation_.time(), ended_);
-    report(step_wall);
+    report_run(simulation_, settings_.profile, summary(step_wall), comm_);
     return done;
   }
 
@@ -140,21 +136,8 @@ class Run {
     apply_stage(case_, *++stage, simulation_.time());
     simulation_.change(case_);
     stages_.note_start(simulation_);
-    const Output& o = case_.output;
-    particles_.change(o.particles), grains_.change(o.grains), contacts_.change(o.contacts), forces_.change(o.forces);
-    history_clock_.change(o.history), checkpoints_.change(o.checkpoint);
-    note_wall();
-  }
-
-  void note_wall() {
-    const Output& o = case_.output;
-    for (const Schedule* s : {&o.particles, &o.grains, &o.contacts, &o.forces, &o.tips, &o.history, &o.checkpoint})
-      needs_wall_ = needs_wall_ || s->interval_wall > 0;
-  }
-
-  static bool writes_forces(const Case& c) {
-    return c.output.forces.active() ||
-           std::ranges::any_of(c.stages, [](const RunStage& s) { return s.changed->output.forces.active(); });
+    clocks_.change(case_.output);
+    needs_wall_ = needs_wall_ || needs_wall_time(case_.output);
   }
 
   bool running() const { return simulation_.time() < case_.time.end && simulation_.steps() < case_.time.steps; }
@@ -163,7 +146,7 @@ class Run {
   Notice advance() {
     try {
       const std::int64_t next = simulation_.steps() + 1;
-      simulation_.keep_balance(stages_.weighs(next) || history_clock_.may_be_due(next));
+      simulation_.keep_balance(stages_.weighs(next) || clocks_.history.may_be_due(next));
       simulation_.step(stages_.end() - simulation_.time());
       return simulation_.notice();
     } catch (const RunError& error) {
@@ -213,7 +196,7 @@ class Run {
   /// Ends the run early, with a checkpoint.
   int stop(const Notice& agreed) {
     throw_together(comm_, tables_.error());
-    if (checkpoints_.last_step() != simulation_.steps()) write_checkpoint_file(false);
+    if (clocks_.checkpoint.last_step() != simulation_.steps()) write_checkpoint_file(false);
     if (rank_ != 0) return stopped;
     const std::string reason = agreed.stop >= wall_limit_reached
                                    ? fmt::format("time.wall_limit = {} s", case_.time.wall_limit)
@@ -253,21 +236,22 @@ class Run {
       return write;
     };
     const auto name = [](const char* kind, const OutputClock& clock) { return numbered_name(kind, clock.count() - 1); };
-    if (wanted(history_clock_)) write_history();
-    if (wanted(forces_)) tables_.add_forces(simulation_);
-    if (wanted(tips_)) tables_.add_tips(simulation_);
-    if (wanted(particles_)) {
-      const std::string file = name("particles", particles_);
+    if (wanted(clocks_.history)) write_history();
+    if (wanted(clocks_.forces)) tables_.add_forces(simulation_);
+    if (wanted(clocks_.tips)) tables_.add_tips(simulation_);
+    if (wanted(clocks_.particles)) {
+      const std::string file = name("particles", clocks_.particles);
       write_particles(simulation_, next_result(file), case_.output.particles.fields);
       particle_index_.add(file, time, comm_);
-      if (!case_.cracks.empty()) write_crack_files(name("cracks", particles_), name("tips", particles_));
+      if (!case_.cracks.empty()) write_crack_files(name("cracks", clocks_.particles), name("tips", clocks_.particles));
     }
-    const bool grains = wanted(grains_), contacts = wanted(contacts_);
-    if (grains) write_grains(simulation_, next_result(name("grains", grains_)));
-    if (contacts) write_contacts(simulation_, next_result(name("contacts", contacts_)), time - contacts_cleared_);
-    if (contacts || (grains && !contacts_.active())) simulation_.clear_contacts(), contacts_cleared_ = time;
-    if (step == 0) checkpoints_.skip(step, time, wall);  // nothing is lost by starting again
-    if (wanted(checkpoints_)) write_checkpoint_file(true);
+    const bool grains = wanted(clocks_.grains), contacts = wanted(clocks_.contacts);
+    if (grains) write_grains(simulation_, next_result(name("grains", clocks_.grains)));
+    if (contacts)
+      write_contacts(simulation_, next_result(name("contacts", clocks_.contacts)), time - contacts_cleared_);
+    if (contacts || (grains && !clocks_.contacts.active())) simulation_.clear_contacts(), contacts_cleared_ = time;
+    if (step == 0) clocks_.checkpoint.skip(step, time, wall);  // nothing is lost by starting again
+    if (wanted(clocks_.checkpoint)) write_checkpoint_file(true);
   }
 
   void write_crack_files(const std::string& cracks, const std::string& tips) {
@@ -315,13 +299,11 @@ class Run {
     state.stage = stages_.state(), state.pouring = simulation_.pouring();
     tables_.note_positions(state);
     share_rank_zero(state);
-    state.particles = particles_.state(), state.grains = grains_.state(), state.contacts = contacts_.state();
-    state.forces = forces_.state(), state.tips = tips_.state(), state.history = history_clock_.state(),
-    state.checkpoint = checkpoints_.state();
+    clocks_.note(state);
     state.contacts_cleared = contacts_cleared_, state.contacts_kept = contacts_kept();
     state.series = particle_index_.entries();
     state.bodies = bodies_checksum(case_);
-    const std::int64_t number = checkpoints_.count() - (scheduled ? 1 : 0);
+    const std::int64_t number = clocks_.checkpoint.count() - (scheduled ? 1 : 0);
     last_checkpoint_ = settings_.out / numbered_name("checkpoint", number);
     write_checkpoint(last_checkpoint_, simulation_, state, case_.resolved);
     if (rank_ == 0) keep_last(settings_.out, case_.output.checkpoint.keep);
@@ -333,16 +315,12 @@ class Run {
     if (needs_wall_) state.wall = wall_before_ + wall_clock() - start_;
     MPI_Bcast(&state.energy, sizeof state.energy, MPI_BYTE, 0, comm_);
     MPI_Bcast(&state.wall, 1, MPI_DOUBLE, 0, comm_);
-    MPI_Bcast(&state.history_file, sizeof state.history_file, MPI_BYTE, 0, comm_);
-    MPI_Bcast(&state.bodies_file, sizeof state.bodies_file, MPI_BYTE, 0, comm_);
-    MPI_Bcast(&state.tips_file, sizeof state.tips_file, MPI_BYTE, 0, comm_);
-    MPI_Bcast(&state.forces_file, sizeof state.forces_file, MPI_BYTE, 0, comm_);
+    for (CsvPosition* file : {&state.history_file, &state.bodies_file, &state.forces_file, &state.tips_file})
+      MPI_Bcast(file, sizeof *file, MPI_BYTE, 0, comm_);
   }
 
   void restore(const RunState& state) {
-    particles_.restore(state.particles), grains_.restore(state.grains), contacts_.restore(state.contacts);
-    forces_.restore(state.forces), tips_.restore(state.tips), history_clock_.restore(state.history),
-        checkpoints_.restore(state.checkpoint);
+    clocks_.restore(state);
     book_.restore(state.energy);
     // Contacts that this run is the first to keep are summed from now on.
     contacts_cleared_ = contacts_kept() && !state.contacts_kept ? simulation_.time() : state.contacts_cleared;
@@ -353,9 +331,7 @@ class Run {
   }
 
   bool contacts_kept() const {
-    const auto asks = [](const Output& o) { return o.grains.active() || o.contacts.active(); };
-    return asks(case_.output) ||
-           std::ranges::any_of(case_.stages, [&](const RunStage& s) { return asks(s.changed->output); });
+    return is_ever_active(case_, &Output::grains) || is_ever_active(case_, &Output::contacts);
   }
 
   double fraction() const {
@@ -375,41 +351,13 @@ class Run {
     return p;
   }
 
-  void report(double step_wall) const {
-    std::int64_t points = 0;
-    for (const auto& patch : simulation_.patches()) points += patch.point_count();
-    const std::int64_t mine[3] = {simulation_.traffic().messages, simulation_.traffic().bytes, points};
-    std::int64_t most[3] = {0, 0, 0};
-    MPI_Reduce(mine, most, 3, MPI_INT64_T, MPI_MAX, 0, comm_);
-    std::int64_t points_now = 0;
-    MPI_Reduce(&points, &points_now, 1, MPI_INT64_T, MPI_SUM, 0, comm_);
-    if (rank_ != 0) return;
-    double total = 0;
-    std::string shares;
-    for (std::size_t s = 0; s + 1 < stage_names.size(); ++s)
-      total += simulation_.timers().seconds(static_cast<Stage>(s));
-    for (std::size_t s = 0; s + 1 < stage_names.size(); ++s)
-      shares += fmt::format(" {} {:.1f} %", stage_names[s],
-                            100 * simulation_.timers().seconds(static_cast<Stage>(s)) / std::max(total, 1e-30));
-    say(stdout, "time of rank 0:{}\n", shares);
-    if (settings_.profile) {
-      const double steps = std::max(1.0, steps_here());
-      say(stdout, "sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
-      say(stdout, "most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
-      const double mean = std::max(1.0, static_cast<double>(points_now)) / ranks_;
-      say(stdout, "balance: largest over mean points {:.3f}, patches moved {} times",
-          static_cast<double>(most[2]) / mean, simulation_.times_balanced());
-      if (simulation_.times_balanced() > 0)
-        say(stdout, ", in the time of {:.2g} steps each",
-            simulation_.seconds_balancing() / simulation_.times_balanced() / (step_wall / steps));
-      say(stdout, "\n");
-    }
+  /// All but the points.
+  RunSummary summary(double step_wall) const {
     RunSummary s;
-    s.steps = simulation_.steps() - steps_before_, s.points = points_now, s.time = simulation_.time();
+    s.steps = simulation_.steps() - steps_before_, s.time = simulation_.time();
     s.wall = wall_clock() - start_, s.step_wall = step_wall;
-    s.point_steps = static_cast<double>(s.steps) * static_cast<double>(s.points);
     s.energy_error = book_.error(), s.ranks = ranks_;
-    say(stdout, "{}\n", format_summary(s));
+    return s;
   }
 
   Case& case_;
@@ -422,7 +370,7 @@ class Run {
   StopSignals signals_;
   double start_;
   Simulation<Dim> simulation_;
-  OutputClock particles_, grains_, contacts_, forces_, tips_, history_clock_, checkpoints_;
+  OutputClocks clocks_;
   SeriesIndex particle_index_;
   HistoryTables<Dim> tables_;
   EnergyBook book_;
