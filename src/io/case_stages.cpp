@@ -129,7 +129,8 @@ Until read_until(Table table, const Case& c) {
   return u;
 }
 
-/// The case with a stage's changes, without its bodies: read as a whole, so that every rule holds.
+/// The case with a stage's changes, without its bodies and cracks, which no stage changes: read as a whole, so that
+/// every rule holds.
 std::shared_ptr<const Case> read_changed(const toml::table& tree, Table& stage, Draft& draft, Errors& errors) {
   Draft next;
   Case &c = next.result, &base = draft.result;
@@ -143,12 +144,13 @@ std::shared_ptr<const Case> read_changed(const toml::table& tree, Table& stage, 
   c.time.dt = time.has("dt") ? time.number("dt", std::nullopt, positive) : 0;
   read_solver(root.table("solver"), c.domain.dimension, c.solver);
   read_contact(root.table("contact"), c.materials, c.contact);
-  std::swap(c.bodies, base.bodies);
+  const auto lend = [&] { std::swap(c.bodies, base.bodies), std::swap(c.cracks, base.cracks); };
+  lend();
   read_drives(root, next);
   read_boundary(root.table("boundary"), next);
   read_damping(root.table("damping"), c.solver.stress_update, c.damping);
   read_output(root.table("output"), next, c.output);
-  std::swap(c.bodies, base.bodies);
+  lend();
   return std::make_shared<const Case>(std::move(c));
 }
 

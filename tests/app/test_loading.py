@@ -123,6 +123,25 @@ def test_stages_end_at_the_same_step_everywhere(cairn: Program, here: Path):
         assert ends_of(again.out) == left, (step, again.out, left)
 
 
+def test_stages_change_every_output(cairn: Program, here: Path):
+    """What a stage turns on is written from then on."""
+    crack = '[[cracks]]\npoints = [[0.0, 0.08], [0.08, 0.08]]\nends = ["open", "tip"]\nbodies = ["cracked"]\n'
+    case = HEAD + DISKS.replace('material = "rubber"', 'material = "rubber"\ngroup = "cracked"', 1) + crack
+    kinds = ("particles", "grains", "contacts", "forces", "tips", "history", "checkpoint")
+    silent = {f"output.{kind}": "{}" for kind in kinds}
+    stages = "[[stage]]\nuntil = { duration = 1e-9 }\n[[stage]]\n" + "".join(
+        f"set.output.{kind} = {{ every = 2 }}\n" for kind in kinds)
+    (here / "case.toml").write_text(case + stages)
+    done = cairn("run", here / "case.toml", "--out", here / "out", *sets({**silent, "time.steps": 6}), timeout=300)
+    expect_code(done, 0)
+    for kind in ("forces", "tips", "history"):
+        rows = (here / "out" / f"{kind}.csv").read_text().splitlines()
+        assert any(row.startswith("4,") for row in rows), (kind, rows[-3:])
+    for kind in ("particles", "grains", "contacts", "checkpoint"):
+        steps = {int(h5py.File(f).attrs["step"]) for f in (here / "out").glob(f"{kind}_*")}
+        assert 4 in steps, (kind, steps)
+
+
 def test_what_ends_a_run(cairn: Program, here: Path):
     """Strain, pressure and packing are what they say."""
     (here / "case.toml").write_text(HEAD + DISKS)
