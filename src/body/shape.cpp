@@ -52,6 +52,10 @@ double Compound::width() const {
   return std::min(least, shapes::least_positive(b.upper - b.lower));
 }
 
+void Compound::shift(const Vec3& way) {
+  for (Shape& part : of) part = shifted(std::move(part), way);
+}
+
 bool contains(const Shape& shape, const Vec3& x) {
   return std::visit([&](const auto& s) { return s.holds(x); }, shape);
 }
@@ -80,6 +84,11 @@ Vec3 centre(const Shape& shape) {
 
 double smallest_width(const Shape& shape) {
   return std::visit([](const auto& s) { return s.width(); }, shape);
+}
+
+Shape shifted(Shape shape, const Vec3& way) {
+  std::visit([&](auto& s) { s.shift(way); }, shape);
+  return shape;
 }
 
 double known_volume(const Shape& shape) {

@@ -16,30 +16,6 @@ namespace {
 
 constexpr int draws = 20;  // of places for a body before it waits for the next attempt
 
-/// The shape moved by a way.
-Shape moved(const Shape& shape, const Vec3& way) {
-  Shape result = shape;
-  std::visit(
-      [&]<class S>(S& s) {
-        if constexpr (std::is_same_v<S, BoxShape>)
-          s.lower += way, s.upper += way;
-        else if constexpr (std::is_same_v<S, Polygon>)
-          for (Vec3& x : s.points) x += way;
-        else if constexpr (std::is_same_v<S, Cylinder>)
-          s.from += way, s.to += way;
-        else if constexpr (std::is_same_v<S, HalfSpace>)
-          s.point += way;
-        else if constexpr (std::is_same_v<S, Compound>)
-          for (Shape& part : s.of) part = moved(part, way);
-        else if constexpr (requires { s.placement; })
-          s.placement.move += way, s.place = Place(s.placement), s.box.lower += way, s.box.upper += way;
-        else if constexpr (requires { s.centre; })
-          s.centre += way;
-      },
-      result);
-  return result;
-}
-
 /// Uniform in [0, 1), the same for the same three numbers (SplitMix64, Steele, Lea & Flood 2014).
 double uniform(std::uint64_t seed, std::uint64_t body, std::uint64_t draw) {
   std::uint64_t x = seed;
@@ -171,7 +147,7 @@ void Simulation<Dim>::insert_bodies() {
         }
         ++state.drawn;
       }
-      const Shape shape = moved(given, way);
+      const Shape shape = shifted(given, way);
       if (!has_room(shape)) {
         failed += insert.drawn ? 1 : draws;
         continue;

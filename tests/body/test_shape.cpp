@@ -155,6 +155,26 @@ TEST(Shape, CentreIsThatOfTheBody) {
   EXPECT_TRUE(centre(slab).isApprox(Vec3(0, 0.75, 0), 1e-14));
 }
 
+TEST(Shape, ShiftedItHoldsWhatItHeldFurtherOn) {
+  const Vec3 way(0.3, -0.2, 0);
+  const Shape half = HalfSpace{{0.1, 0.2, 0}, {1, 2, 0}};
+  const Shape disk = Ball{{0.1, 0.2, 0}, 1};
+  for (const Shape& shape :
+       {disk, half, Shape(BoxShape{{-1, -0.5, 0}, {1, 0.5, 0}, 0.4}), Shape(Ellipsoid{{0.1, 0, 0}, {1, 0.5, 0}, 0.3}),
+        Shape(regular(5, 1, false)), Shape(Cylinder{{-1, 0, 0}, {1, 0.3, 0}, 0.4}),
+        Shape(Compound{CompoundOperation::intersection, {disk, half}})}) {
+    const Shape further = shifted(shape, way);
+    EXPECT_LT((centre(further) - centre(shape) - way).norm(), std::holds_alternative<HalfSpace>(shape) ? 1 : 1e-14);
+    EXPECT_TRUE(bounds(further).lower.x() == -shapes::infinity ||
+                std::abs(bounds(further).lower.x() - bounds(shape).lower.x() - way.x()) < 1e-14);
+    for (int i = 0; i < 40; ++i)
+      for (int j = 0; j < 40; ++j) {
+        const Vec3 x(-2.003 + 0.1 * i, -2.001 + 0.1 * j, 0);
+        EXPECT_EQ(contains(further, x + way), contains(shape, x)) << shape.index() << " at " << x.transpose();
+      }
+  }
+}
+
 TEST(Shape, SmallestWidth) {
   EXPECT_EQ(smallest_width(Ball{{1, 2, 3}, 1.5}), 3);
   EXPECT_EQ(smallest_width(BoxShape{{0, 0, 0}, {2, 1, 0}, 0.3}), 1);

@@ -168,6 +168,11 @@ TEST(Solid, APlacedMeshIsScaledTurnedAndMoved) {
   EXPECT_TRUE(contains(shape, {0.995, 2.015, 3.005}));
   EXPECT_FALSE(contains(shape, {1.005, 2.015, 3.005}));
   EXPECT_LT((bounds(shape).lower - Vec3(0.99, 2, 3)).norm(), 1e-12);
+  const Shape further = shifted(shape, {5, 0, 1});
+  EXPECT_LT((centre(further) - Vec3(5.995, 2.01, 4.005)).norm(), 1e-12);
+  EXPECT_TRUE(contains(further, {5.995, 2.015, 4.005}));
+  EXPECT_FALSE(contains(further, {0.995, 2.015, 3.005}));
+  EXPECT_LT((bounds(further).lower - Vec3(5.99, 2, 4)).norm(), 1e-12);
 }
 
 TEST(Loops, HolesCountWhicheverWayTheyRun) {

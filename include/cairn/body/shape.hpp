@@ -33,6 +33,7 @@ struct Compound {
   Bounds extent() const;
   /// An estimate: what a difference takes away from its first shape does not count.
   double width() const;
+  void shift(const Vec3& way);
 };
 
 /// True where `x` lies inside the shape (its boundary counts as inside).
@@ -47,6 +48,9 @@ Vec3 centre(const Shape& shape);
 
 /// Smallest width of the shape [m], an estimate for resolution warnings (twice the smallest radius for a ball).
 double smallest_width(const Shape& shape);
+
+/// The shape moved by a way [m].
+Shape shifted(Shape shape, const Vec3& way);
 
 /// Volume of a whole shape where it knows it itself [m^Dim]; below 0: it has to be measured.
 double known_volume(const Shape& shape);

@@ -20,6 +20,7 @@ struct Ball {
   bool holds(const Vec3& x) const { return (x - centre).squaredNorm() <= radius * radius * (1 + shapes::margin); }
   Bounds extent() const { return shapes::around(centre, Vec3::Constant(radius)); }
   double width() const { return 2 * radius; }
+  void shift(const Vec3& way) { centre += way; }
 };
 
 }  // namespace cairn

@@ -39,6 +39,7 @@ struct BoxShape {
                           {cs * half.x() + sn * half.y(), sn * half.x() + cs * half.y(), half.z()});
   }
   double width() const { return shapes::least_positive(upper - lower); }
+  void shift(const Vec3& way) { lower += way, upper += way; }
 };
 
 }  // namespace cairn

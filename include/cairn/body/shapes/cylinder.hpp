@@ -33,6 +33,7 @@ struct Cylinder {
     return {from.cwiseMin(to) - half, from.cwiseMax(to) + half};
   }
   double width() const { return std::min(2 * radius, (to - from).norm()); }
+  void shift(const Vec3& way) { from += way, to += way; }
 };
 
 }  // namespace cairn

@@ -32,6 +32,7 @@ struct Ellipsoid {
     return shapes::around(centre, {std::hypot(cs * a, sn * b), std::hypot(sn * a, cs * b), radii.z()});
   }
   double width() const { return 2 * shapes::least_positive(radii); }
+  void shift(const Vec3& way) { centre += way; }
 };
 
 }  // namespace cairn

@@ -29,6 +29,7 @@ struct HalfSpace {
     return all;
   }
   double width() const { return shapes::infinity; }
+  void shift(const Vec3& way) { point += way; }
 
   /// Draws the bounds in to those of their part on the side of the plane that `normal` points away from.
   static void cut(Bounds& box, const Vec3& point, const Vec3& normal) {

@@ -25,6 +25,7 @@ struct LabelBody {
   bool holds(const Vec3& x) const { return labels->label_at(place.in_file(x)) == index; }
   Bounds extent() const { return box; }
   double width() const { return 2 * inner_radius(); }
+  void shift(const Vec3& way) { place.shift(way), box.lower += way, box.upper += way; }
   Vec3 middle() const { return place.in_space(labels->facts(index).inner_centre); }
   double volume() const { return std::pow(place.factor(), labels->dimension()) * labels->volume_of(index); }
 

@@ -6,17 +6,13 @@
 
 namespace cairn {
 
-struct Mesh {
+struct Mesh : FromFile {
   static constexpr shapes::Names names = {"", "mesh"};
   static constexpr bool round = true;
 
-  ShapeFile file;
-  Placement placement;
   std::string solid;                      // its name, or "#N" by its number from 0; empty: all that the file holds
   double holes = 0;                       // the largest that is closed [m]
   std::shared_ptr<const Solid> inside{};  // in the file's lengths
-  Place place{};
-  Bounds box{};
   std::size_t count = 0;  // of solids, while it stands for each of them
 
   template <class Self, class Keys>
@@ -27,7 +23,6 @@ struct Mesh {
     keys.not_negative("holes", s.holes);
   }
   bool holds(const Vec3& x) const { return inside->holds(place.in_file(x)); }
-  Bounds extent() const { return box; }
   double width() const { return place.factor() * inside->thickness(); }
   Vec3 middle() const { return place.in_space(inside->centroid()); }
   double volume() const { return std::pow(place.factor(), 3) * inside->volume(); }

@@ -6,16 +6,12 @@
 
 namespace cairn {
 
-struct Outline {
+struct Outline : FromFile {
   static constexpr shapes::Names names = {"outline", ""};
   static constexpr bool round = true;
 
-  ShapeFile file;
-  Placement placement;
   std::string line;                      // its name, or "#N" by its number from 0; empty: all that the file holds
   std::shared_ptr<const Loops> loops{};  // in the file's lengths
-  Place place{};
-  Bounds box{};
   std::size_t count = 0;  // of lines, while it stands for each of them
 
   template <class Self, class Keys>
@@ -25,7 +21,6 @@ struct Outline {
     keys.text("line", s.line);
   }
   bool holds(const Vec3& x) const { return loops->holds(place.in_file(x)); }
-  Bounds extent() const { return box; }
   double width() const { return place.factor() * loops->thickness(); }
   Vec3 middle() const { return place.in_space(loops->centroid()); }
   double volume() const { return std::pow(place.factor(), 2) * loops->area(); }

@@ -49,6 +49,7 @@ class Place {
   explicit Place(const Placement& p)
       : turn_(p.turn()), move_(p.move), factor_(p.factor()), turned_(p.rotate != Vec3::Zero()) {}
   double factor() const { return factor_; }
+  void shift(const Vec3& way) { move_ += way; }
   Vec3 in_space(const Vec3& x) const {
     return move_ + (turned_ ? (turn_ * (factor_ * x)).eval() : (factor_ * x).eval());
   }
@@ -70,6 +71,17 @@ class Place {
   Vec3 move_ = Vec3::Zero();
   double factor_ = 1;
   bool turned_ = false;
+};
+
+/// What shapes from files have in common.
+struct FromFile {
+  ShapeFile file;
+  Placement placement;
+  Place place{};
+  Bounds box{};
+
+  Bounds extent() const { return box; }
+  void shift(const Vec3& way) { placement.move += way, place.shift(way), box.lower += way, box.upper += way; }
 };
 
 }  // namespace cairn

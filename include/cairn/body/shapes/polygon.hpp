@@ -26,6 +26,9 @@ struct Polygon {
   }
   /// Least distance between two lines along an edge which hold the polygon between them.
   double width() const;
+  void shift(const Vec3& way) {
+    for (Vec3& x : points) x += way;
+  }
 };
 
 namespace shapes {
