@@ -156,7 +156,7 @@ def grid_of(snapshot: Snapshot, box: tuple[np.ndarray, np.ndarray], radius: floa
     """A grid over a box [m]; by default the kernel's radius is a mean diameter and a cell at most half of that."""
     radius = radius or float(snapshot.grains.diameter.mean())
     cells = np.maximum(np.ceil((box[1] - box[0]) / (cell or radius / 2) * (1 - 1e-12)), 1).astype(int)
-    whole = np.isclose(box[0], snapshot.run.lower) & np.isclose(box[1], snapshot.run.upper)
+    whole = np.isclose(box[0], snapshot.run.lower) & np.isclose(box[1], snapshot.upper)
     return Grid(np.asarray(box[0], float), (box[1] - box[0]) / cells, cells, snapshot.run.periodic & whole, radius)
 
 

@@ -238,7 +238,7 @@ def pair_table(snapshot: Snapshot, options: Options) -> Table:
     """g(r) to five mean diameters, or as far as the box allows."""
     grains, box = snapshot.grains, box_of(snapshot, options)
     diameter, size = float(grains.diameter.mean()), box[1] - box[0]
-    whole = np.isclose(box[0], snapshot.run.lower) & np.isclose(box[1], snapshot.run.upper)
+    whole = np.isclose(box[0], snapshot.run.lower) & np.isclose(box[1], snapshot.upper)
     periodic = snapshot.run.periodic & whole
     reach = min(5 * diameter, *np.where(periodic, size / 2, size / 3))
     r, g = pair_correlation(snapshot.wrapped(grains.centre), box, periodic, reach, options.bins)

@@ -91,7 +91,8 @@ class Snapshot:
         self.threshold = threshold  # contacts below this share of the mean force are left out
         self.frame = run.grains[index]
         self.time, self.step = self.frame.time, self.frame.step
-        self.period = np.where(run.periodic, run.upper - run.lower, 0.0)
+        self.upper = run.upper_at(self.time)  # corner of the domain
+        self.period = np.where(run.periodic, self.upper - run.lower, 0.0)
 
     def same_time(self, frames: list[Frame], what: str) -> Frame:
         """The output of another kind at this time."""
@@ -192,7 +193,7 @@ class Snapshot:
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Between walls and tools: the domain, cut where a wall stands now, or where a tool lies wholly on one side of
         nearly all the grains' centres."""
-        lower, upper = self.run.lower.copy(), self.run.upper.copy()
+        lower, upper = self.run.lower.copy(), self.upper.copy()
         for face in self.faces("wall"):
             if moves(self.run.case["boundary"][face]):
                 axis, high = divmod(FACES.index(face), 2)

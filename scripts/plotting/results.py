@@ -148,6 +148,15 @@ class Run:
         if not self.point_spacing > 0:
             raise ValueError(f"solver.points_per_cell gives a spacing of {self.point_spacing}")
 
+    def upper_at(self, time: float) -> np.ndarray:
+        """The upper corner of the domain then [m], which may deform."""
+        if "deform" not in self.case["domain"] and not any("deform" in stage.get("set", {}).get("domain", {})
+                                                           for stage in self.case.get("stage", [])):
+            return self.upper
+        history = self.history()
+        return self.lower + [np.interp(time, history["time"], history[f"length_{axis}"])
+                             for axis in "xyz"[: self.dimension]]
+
     def _has_failed(self) -> bool:
         """Whether the last run into this folder failed: it says so itself, or it left its last state."""
         record = self.folder / "run.json"

@@ -8,12 +8,25 @@ template <int Dim>
 Lattice<Dim>::Lattice(const Vec<Dim>& lower, const Vec<Dim>& upper, const Index<Dim>& cells,
                       const std::array<bool, Dim>& periodic, int patch_cells)
     : lower_(lower), upper_(upper), cells_(cells), periodic_(periodic) {
+  measure();
   for (int d = 0; d < Dim; ++d) {
-    spacing_[d] = (upper[d] - lower[d]) / cells[d];
-    inverse_[d] = cells[d] / (upper[d] - lower[d]);
-    last_[d] = last_inside(d);
     patches_[d] = std::max(1, cells[d] / patch_cells);
     patch_count_ *= patches_[d];
+  }
+}
+
+template <int Dim>
+void Lattice<Dim>::set_upper(const Vec<Dim>& upper) {
+  upper_ = upper;
+  measure();
+}
+
+template <int Dim>
+void Lattice<Dim>::measure() {
+  for (int d = 0; d < Dim; ++d) {
+    spacing_[d] = length(d) / cells_[d];
+    inverse_[d] = cells_[d] / length(d);
+    last_[d] = last_inside(d);
   }
 }
 

@@ -30,6 +30,7 @@ Case read_case(const std::filesystem::path& file, const std::vector<Override>& o
     root.missing("bodies", "no body is given; give at least one [[bodies]], [[grains]] or [[labels]]");
   read_drives(root, draft);
   read_cracks(root, draft);
+  read_deform(root.table("domain").table("deform"), draft);
   check_pressures(draft, errors);
   read_boundary(root.table("boundary"), draft);
   read_damping(root.table("damping"), c.solver.stress_update, c.damping);

@@ -164,6 +164,7 @@ void read_domain(Table domain, Domain& d) {
       domain.error("periodic", fmt::format("direction {} has {} cells; a periodic direction needs at least 4", "xyz"[k],
                                            d.cells[k]));
   d.gravity = domain.motion("gravity", dim);
+  domain.has("deform");  // read_deform
   d.patch_cells = static_cast<int>(domain.integer("patch_cells", default_patch_cells(d, dim), 4, 4096));
   domain.finish();
 }

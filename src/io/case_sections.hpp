@@ -62,7 +62,16 @@ struct Draft {
   std::map<std::string, std::shared_ptr<const Solid>> solids;  // that were made of them
 };
 
+/// The largest of the deformable materials; 1 where there is none.
+struct Hardness {
+  double wave_speed = 1;  // [m/s]
+  double impedance = 1;   // density x wave speed [kg/(m2 s)]
+};
+Hardness hardness_of(const std::vector<Material>& materials);
+
 void read_domain(Table domain, Domain& result);
+/// [domain.deform]; after all that cannot be in a domain that deforms.
+void read_deform(Table deform, Draft& draft);
 /// `staged`: what ends the run may be a stage.
 void read_time(Table time, bool staged, Time& result);
 void read_solver(Table solver, int dimension, SolverOptions& result);

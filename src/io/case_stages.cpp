@@ -14,6 +14,7 @@ namespace {
 
 /// Keys that a stage may change; * stands for one part.
 constexpr std::string_view changing_keys[] = {"domain.gravity",
+                                              "domain.deform",
                                               "time.cfl",
                                               "time.dt",
                                               "contact.friction",
@@ -77,9 +78,11 @@ class Changes {
   }
   /// A piston takes the place of a servo, a force that of a pressure, and the other way.
   static void drop_other(toml::table& table, const std::string& name) {
-    for (const auto& [a, b] : {std::pair("piston", "servo"), std::pair("force", "pressure")})
+    for (const auto& [a, b] :
+         {std::pair("piston", "servo"), std::pair("force", "pressure"), std::pair("strain_rate", "stress")})
       if (name == a || name == b) table.erase(name == a ? b : a);
     if (name == "force") table.erase("area");
+    if (name == "strain_rate") table.erase("viscosity"), table.erase("memory"), table.erase("largest_rate");
   }
   void refuse(const std::string& at) {
     stage_.error("set", fmt::format("{} cannot change in a run; what can is {}", at, listed(changing_keys)));
@@ -88,13 +91,14 @@ class Changes {
   toml::table& tree_;
 };
 
-/// Names of what feels a force; of walls and fixed faces those of the case.
+/// Names of what feels a force; of walls and fixed faces those of the case; and a domain that deforms.
 std::vector<std::string> tool_names(const Case& c) {
   std::vector<std::string> names;
   for (int f = 0; f < 2 * c.domain.dimension; ++f)
     if (c.faces[f].type == FaceType::wall || c.faces[f].type == FaceType::fixed) names.emplace_back(face_names[f]);
   for (std::size_t d = 0; d < c.drives.size(); ++d)
     names.push_back(c.drives[d].group.empty() ? fmt::format("drive{}", d) : c.drives[d].group);
+  if (std::ranges::count(c.domain.periodic, true) > 0) names.emplace_back(whole_domain);
   return names;
 }
 
@@ -117,7 +121,8 @@ Until read_until(Table table, const Case& c) {
     const std::vector<std::string_view> views(names.begin(), names.end());
     if (std::ranges::find(names, u.of) == names.end() && table.has("of"))
       table.error("of", fmt::format("{} feels no force; choose one of {}", in_quotes(u.of), listed(views)));
-    const bool face = std::ranges::find(face_names, u.of) != face_names.end();
+    const bool face = u.of == whole_domain || std::ranges::find(face_names, u.of) != face_names.end();
+    if (u.of == whole_domain && std::isfinite(u.force)) table.error("force", "is none of the domain; give pressure");
     if (!face && std::isfinite(u.strain) && u.length == 0)
       table.missing("length", "is missing; the strain of a drive needs the length that it refers to [m]");
     if (!face && std::isfinite(u.pressure) && u.area == 0)
@@ -144,9 +149,12 @@ std::shared_ptr<const Case> read_changed(const toml::table& tree, Table& stage, 
   c.time.dt = time.has("dt") ? time.number("dt", std::nullopt, positive) : 0;
   read_solver(root.table("solver"), c.domain.dimension, c.solver);
   read_contact(root.table("contact"), c.materials, c.contact);
-  const auto lend = [&] { std::swap(c.bodies, base.bodies), std::swap(c.cracks, base.cracks); };
+  const auto lend = [&] {
+    std::swap(c.bodies, base.bodies), std::swap(c.cracks, base.cracks), std::swap(c.inserts, base.inserts);
+  };
   lend();
   read_drives(root, next);
+  read_deform(root.table("domain").table("deform"), next);
   read_boundary(root.table("boundary"), next);
   read_damping(root.table("damping"), c.solver.stress_update, c.damping);
   read_output(root.table("output"), next, c.output);

@@ -134,23 +134,16 @@ void read_piston(Table& parent, const Place& place, StressUpdate update, Piston&
 }
 
 Place place_in(const Case& c, int face) {
-  Place place{
-      c.domain.dimension, face >= 0, Vec3::Zero(), 1, 1, smallest_cell(c.domain), c.domain.upper - c.domain.lower,
-      c.time.end};
+  const Hardness hardness = hardness_of(c.materials);
+  Place place{c.domain.dimension,
+              face >= 0,
+              Vec3::Zero(),
+              hardness.wave_speed,
+              hardness.impedance,
+              smallest_cell(c.domain),
+              c.domain.upper - c.domain.lower,
+              c.time.end};
   if (face >= 0) place.inwards[face / 2] = face % 2 ? -1 : 1;
-  double fastest = 0, hardest = 0;
-  for (const Material& m : c.materials) {
-    const LawInfo* law = find_law(m.model);
-    if (!law || m.model == "rigid") continue;
-    const auto known = [&](const Parameter& p) {
-      return m.parameters.contains(std::string(p.key)) || m.parameters.contains(list_key(p.key, 0));
-    };
-    if (!std::ranges::all_of(law->parameters, known)) continue;  // after an error
-    const double modulus = longitudinal_modulus(make_law(m.model, m.parameters, m.plane));
-    fastest = std::max(fastest, std::sqrt(modulus / m.density));
-    hardest = std::max(hardest, std::sqrt(modulus * m.density));
-  }
-  if (fastest > 0) place.wave_speed = fastest, place.impedance = hardest;
   return place;
 }
 
@@ -196,6 +189,22 @@ void read_face(Table table, const Draft& draft, int number, Face& face) {
 }
 
 }  // namespace
+
+Hardness hardness_of(const std::vector<Material>& materials) {
+  Hardness found{0, 0};
+  for (const Material& m : materials) {
+    const LawInfo* law = find_law(m.model);
+    if (!law || m.model == "rigid") continue;
+    const auto known = [&](const Parameter& p) {
+      return m.parameters.contains(std::string(p.key)) || m.parameters.contains(list_key(p.key, 0));
+    };
+    if (!std::ranges::all_of(law->parameters, known)) continue;  // after an error
+    const double modulus = longitudinal_modulus(make_law(m.model, m.parameters, m.plane));
+    found.wave_speed = std::max(found.wave_speed, std::sqrt(modulus / m.density));
+    found.impedance = std::max(found.impedance, std::sqrt(modulus * m.density));
+  }
+  return found.wave_speed > 0 ? found : Hardness{};
+}
 
 void read_drives(Table& root, Draft& draft) {
   for (Table& table : root.tables("drive")) {

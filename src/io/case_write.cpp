@@ -159,6 +159,15 @@ class Writer {
     if (f.piston.mass > 0) text += ", " + piston_of(f.piston, false);
     raw(name, text + " }");
   }
+  void axis(std::string_view name, const AxisDeformation& a) {
+    const bool stress = a.by == AxisDeformation::By::stress;
+    std::string text = fmt::format("{{ {} = {}", stress ? "stress" : "strain_rate", table_of(a.target, 0, 1));
+    if (a.target.repeat) text += ", repeat = true";
+    if (stress)
+      text += fmt::format(", viscosity = {}, memory = {}, largest_rate = {}", text_of(a.viscosity), text_of(a.memory),
+                          text_of(a.largest_rate));
+    raw(name, text + " }");
+  }
   void text(std::string_view lines) { text_ += lines; }
   std::string take() { return std::move(text_); }
 
@@ -176,6 +185,8 @@ void write_domain(Writer& out, const Domain& d) {
   out.raw("periodic", list_of(d.periodic, d.dimension));
   out.raw("gravity", Writer::table_of(d.gravity, 0, d.dimension));
   out.key("patch_cells", d.patch_cells);
+  for (int k = 0; k < d.dimension; ++k)
+    if (d.deformation.axes[k].active()) out.axis(fmt::format("deform.{}", "xyz"[k]), d.deformation.axes[k]);
 }
 
 void write_time_and_solver(Writer& out, const Time& time, const SolverOptions& solver) {

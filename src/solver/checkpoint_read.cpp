@@ -334,6 +334,11 @@ void Checkpoint::check_layout(const Lattice<Dim>& lattice) const {
       patches == lattice.patch_count()
           ? ""
           : fmt::format("it divides the domain into {} patches, the case into {}", patches, lattice.patch_count()));
+  for (int d = 0; d < Dim; ++d) {
+    const double upper = state_.step.upper[d];
+    const bool fits = upper == lattice.upper()[d] || (lattice.periodic(d) && upper > lattice.lower()[d]);
+    reader_.require(fits ? "" : fmt::format("its domain ends at {} in direction {}", upper, "xyz"[d]));
+  }
   const bool ordered = std::ranges::adjacent_find(patches_, std::greater_equal{}) == patches_.end() &&
                        (patches_.empty() || (patches_.front() >= 0 && patches_.back() < lattice.patch_count()));
   reader_.require(ordered ? "" : "its patches are not in their order, or not those of the case");

@@ -6,9 +6,7 @@
 // and spins are set to zero at the step after a peak of the kinetic energy (Otter, Cassell & Hobbs 1966; kinetic
 // damping).
 
-#include <bit>
-#include <map>
-
+#include "cairn/parallel/patch_sums.hpp"
 #include "cairn/solver/simulation.hpp"
 
 namespace cairn {
@@ -105,7 +103,7 @@ void Simulation<Dim>::damp(Patch<Dim>& patch, Piece<Dim>& piece) {
 template <int Dim>
 void Simulation<Dim>::relax() {
   if (!damping_.relax) return;
-  std::vector<double> mine;
+  PatchSums<1> sums;
   std::vector<NetMotion> motions;
   for (const auto& patch : patches_) {
     if (patch.point_count() == 0) continue;
@@ -116,13 +114,9 @@ void Simulation<Dim>::relax() {
       sum += motion_of(piece, material_of(piece).density, inertia, transfer_.gravity, dt_);
     }
     motions.push_back(sum);
-    mine.push_back(std::bit_cast<double>(patch.id)), mine.push_back(sum.kinetic());
+    sums.add(patch.id, {sum.kinetic()});
   }
-  const std::vector<double> all = gather_on_all(mine, comm_);
-  std::map<PatchId, double> ordered;
-  for (std::size_t i = 0; i < all.size(); i += 2) ordered[std::bit_cast<PatchId>(all[i])] = all[i + 1];
-  double now = 0;
-  for (const auto& [patch, part] : ordered) now += part;
+  const double now = sums.on_all(comm_)[0];
   const bool peak = now < kinetic_[0] && kinetic_[0] >= kinetic_[1];
   kinetic_ = {peak ? 0.0 : now, peak ? 0.0 : kinetic_[0]};
   if (!peak) return;

@@ -25,7 +25,10 @@ std::vector<std::string> history_columns(int dimension) {
                              "mass_left", "energy_left", "momentum_left_x", "momentum_left_y"});
   if (dimension == 3) names.emplace_back("momentum_left_z");
   names.insert(names.end(), {"crack_energy", "crack_dissipation", "damping_dissipation", "unbalanced_force",
-                             "largest_unbalanced_force"});
+                             "largest_unbalanced_force", "length_x", "length_y"});
+  if (dimension == 3) names.emplace_back("length_z");
+  names.insert(names.end(), {"stress_xx", "stress_yy", "stress_zz", "stress_xy"});
+  if (dimension == 3) names.insert(names.end(), {"stress_yz", "stress_xz"});
   return names;
 }
 
@@ -90,6 +93,8 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
   if (Dim == 3) row.emplace_back(t.momentum_left_z);
   row.insert(row.end(), {t.crack_energy, t.crack_dissipation, t.damped, simulation.force_balance().mean(),
                          simulation.force_balance().largest()});
+  for (int d = 0; d < Dim; ++d) row.emplace_back(simulation.face_distance(2 * d));
+  row.insert(row.end(), t.stress.begin(), t.stress.begin() + symmetric_size<Dim>);
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

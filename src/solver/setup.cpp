@@ -162,7 +162,7 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
   define_pouring(c);
   transfer_of_turning_ = transfer_;
   transfer_of_turning_.spin = true;
-  gravity_ = c.domain.gravity, damping_ = c.damping;
+  gravity_ = c.domain.gravity, damping_ = c.damping, deformation_ = c.domain.deformation;
   place_walls();
   if (from)
     restore(*from);
@@ -196,6 +196,8 @@ void Simulation<Dim>::restore(const Checkpoint& from) {
   std::vector<std::int64_t> points;
   for (std::size_t p = 0; p < from.patches().size(); ++p)
     if (from.points()[p] > 0) filled.push_back(from.patches()[p]), points.push_back(from.points()[p]);
+  place_corner(head<Dim>(from.state().step.upper));
+  needed_rates_ = from.state().step.needed_rates;
   make_patches(filled, points, from.patches());
   restore_cracks(from.state().cracks);
   restore_parts(from.state().parts, from.state().spared);

@@ -91,6 +91,7 @@ void Simulation<Dim>::step(double longest) {
   end_tools();
   time_ += dt_;
   ++steps_;
+  deform();
   relax();
   remove_bodies();
   insert_bodies();
@@ -142,10 +143,11 @@ void Simulation<Dim>::project_piece(Patch<Dim>& patch, Piece<Dim>& piece) {
   project(piece, lattice_, transfer_of(piece), material_of(piece).density);
 }
 
-/// Projects a piece for the step that comes next, unless there are cracks whose places then are not known yet.
+/// Projects a piece for the step that comes next, unless places then are not known yet: of cracks, or in a domain that
+/// deforms.
 template <int Dim>
 void Simulation<Dim>::project_ahead(Patch<Dim>& patch, Piece<Dim>& piece) {
-  if (!patch.cracks.empty()) return;
+  if (!patch.cracks.empty() || deformation_.active()) return;
   const auto time = timers_.measure(Stage::project);
   project_piece(patch, piece);
   piece.projected = true;
@@ -312,7 +314,9 @@ void Simulation<Dim>::start_speed_reduction() {
 template <int Dim>
 StepState Simulation<Dim>::step_state() {
   finish_speed_reduction();
-  return {time_, dt_, maxima_[0], maxima_[1], steps_, kinetic_};
+  StepState state{time_, dt_, maxima_[0], maxima_[1], steps_, kinetic_, Vec3::Zero(), needed_rates_};
+  state.upper.template head<Dim>() = lattice_.upper();
+  return state;
 }
 
 template <int Dim>

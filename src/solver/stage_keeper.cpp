@@ -21,6 +21,14 @@ void replace(Piston& piston, const Piston& by, double since) {
   piston.force = force;
 }
 
+/// A target of another kind begins now in any case.
+void replace(AxisDeformation& axis, const AxisDeformation& by, double since) {
+  MotionTable target = axis.by == by.by ? axis.target : MotionTable();
+  replace(target, by.target, since);
+  axis = by;
+  axis.target = target;
+}
+
 int tool_of(const std::vector<Tool>& tools, const std::string& name) {
   return static_cast<int>(std::ranges::find(tools, name, &Tool::name) - tools.begin());
 }
@@ -40,6 +48,8 @@ constexpr double looks_at_rest = 3;  // in a row
 void apply_stage(Case& c, const RunStage& stage, double since) {
   const Case& by = *stage.changed;
   replace(c.domain.gravity, by.domain.gravity, since);
+  for (std::size_t k = 0; k < c.domain.deformation.axes.size(); ++k)
+    replace(c.domain.deformation.axes[k], by.domain.deformation.axes[k], since);
   for (std::size_t f = 0; f < c.faces.size(); ++f) {
     replace(c.faces[f].velocity, by.faces[f].velocity, since);
     replace(c.faces[f].piston, by.faces[f].piston, since);
@@ -113,6 +123,8 @@ void StageKeeper::note_start(const Simulation<Dim>& simulation) {
   if (std::exchange(noted_, true)) return;
   const auto note = [&](const Until& until, Look& look) {
     const int tool = tool_of(simulation.tools(), until.of);
+    if (until.of == whole_domain)
+      for (int d = 0; d < Dim; ++d) look.place[d] = simulation.lattice().length(d);
     if (until.of.empty() || tool == std::ssize(simulation.tools())) return;
     const Vec3 place = simulation.tools()[tool].place();
     std::copy_n(place.data(), 3, look.place.begin());
@@ -145,6 +157,19 @@ std::string StageKeeper::force_met(const Until& until, Look& look, const Simulat
 }
 
 template <int Dim>
+std::string StageKeeper::domain_met(const Until& until, const Look& look, const Simulation<Dim>& simulation) {
+  double strain = 0;
+  for (int d = 0; d < Dim; ++d) strain = std::max(strain, std::abs(simulation.lattice().length(d) / look.place[d] - 1));
+  if (strain >= until.strain) return fmt::format("the strain of the domain is {:.6g}", strain);
+  if (!std::isfinite(until.pressure)) return {};
+  const auto stress = simulation.mean_stress();
+  double pressure = 0;
+  for (int d = 0; d < Dim; ++d) pressure -= stress[d] / Dim;
+  const bool reached = until.falls ? pressure <= until.pressure : pressure >= until.pressure;
+  return reached ? fmt::format("the pressure in the domain is {:.6g} Pa", pressure) : "";
+}
+
+template <int Dim>
 std::string StageKeeper::met(const Until& until, Look& look, const Simulation<Dim>& simulation) {
   const double time = simulation.time();
   if (time >= until.time * (1 - 1e-12)) return fmt::format("time {} s", until.time);
@@ -152,8 +177,12 @@ std::string StageKeeper::met(const Until& until, Look& look, const Simulation<Di
   if (simulation.steps() % until.every != 0) return {};
   std::string why;
   const int tool = tool_of(simulation.tools(), until.of);
-  if (std::isfinite(until.force) || std::isfinite(until.pressure)) why = force_met(until, look, simulation, tool);
-  if (why.empty() && std::isfinite(until.strain)) {
+  const bool domain = until.of == whole_domain;
+  if (domain)
+    why = domain_met(until, look, simulation);
+  else if (std::isfinite(until.force) || std::isfinite(until.pressure))
+    why = force_met(until, look, simulation, tool);
+  if (why.empty() && !domain && std::isfinite(until.strain)) {
     const Vec3 way = simulation.tools()[tool].place() - Vec3(look.place.data());
     const Vec3 along = pressing_way(simulation.tools()[tool], tool);
     const double strain = (along == Vec3::Zero() ? way.norm() : std::abs(way.dot(along))) /

@@ -47,6 +47,8 @@ class StageKeeper {
   template <int Dim>
   std::string met(const Until& until, Look& look, const Simulation<Dim>& simulation);
   template <int Dim>
+  std::string domain_met(const Until& until, const Look& look, const Simulation<Dim>& simulation);
+  template <int Dim>
   std::string force_met(const Until& until, Look& look, const Simulation<Dim>& simulation, int tool);
   const Until* of_stage() const { return case_.stages.empty() ? nullptr : &case_.stages[stage_].until; }
 

@@ -1,8 +1,6 @@
 // What a stage changes, and what is measured to tell when it ends.
 
-#include <bit>
-#include <map>
-
+#include "cairn/parallel/patch_sums.hpp"
 #include "cairn/solver/body_states.hpp"
 #include "cairn/solver/simulation.hpp"
 #include "setup.hpp"
@@ -33,6 +31,9 @@ void Simulation<Dim>::change(const Case& c) {
   const FaceConditions<Dim> faces = make_faces<Dim>(c);
   for (int f = 0; f < 2 * Dim; ++f) contact_.faces[f].friction = faces[f].friction;
   gravity_ = c.domain.gravity;
+  for (int d = 0; d < Dim; ++d)
+    if (deformation_.axes[d].by != c.domain.deformation.axes[d].by) needed_rates_[d] = 0;
+  deformation_ = c.domain.deformation;
   pull_by(gravity_.at(time_));
   for (std::size_t t = 0; t < tools_.size(); ++t) {
     Tool& tool = tools_[t];
@@ -64,11 +65,10 @@ void Simulation<Dim>::change(const Case& c) {
   speeds_ = speeds, dt_ = dt;
 }
 
-/// Sums over patches are made in their order.
 template <int Dim>
 double Simulation<Dim>::packing_fraction() const {
   using C = PointColumns<Dim>;
-  std::vector<double> mine;
+  PatchSums<1> sums;
   for (const auto& patch : patches_) {
     if (patch.point_count() == 0) continue;
     double volume = 0;
@@ -78,32 +78,22 @@ double Simulation<Dim>::packing_fraction() const {
         for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = piece.points.column(C::deformation + i)[p];
         volume += piece.points.column(C::volume)[p] * determinant(F);
       }
-    mine.push_back(std::bit_cast<double>(patch.id)), mine.push_back(volume);
+    sums.add(patch.id, {volume});
   }
-  const std::vector<double> all = gather_on_all(mine, comm_);
-  std::map<PatchId, double> ordered;
-  for (std::size_t i = 0; i < all.size(); i += 2) ordered[std::bit_cast<PatchId>(all[i])] = all[i + 1];
-  double volume = 0;
-  for (const auto& [patch, part] : ordered) volume += part;
-  double room = 1;
-  for (int d = 0; d < Dim; ++d) room *= face_distance(2 * d);
-  return volume / room;
+  return sums.on_all(comm_)[0] / room();
 }
 
 template <int Dim>
 ForceBalance Simulation<Dim>::weigh_bodies() const {
   std::vector<PieceVector> nets;
-  std::vector<double> mine;
+  PatchSums<1> pressing;
   for (const auto& patch : patches_) {
     for (const auto& piece : patch.pieces)
       if (!is_rigid(piece) && piece.net_force != Vec3::Zero()) nets.push_back({piece.body, patch.id, piece.net_force});
-    if (patch.pressing > 0) mine.push_back(std::bit_cast<double>(patch.id)), mine.push_back(patch.pressing);
+    if (patch.pressing > 0) pressing.add(patch.id, {patch.pressing});
   }
   ForceBalance balance;
-  std::map<PatchId, double> pressing;
-  const std::vector<double> all = gather_on_all(mine, comm_);
-  for (std::size_t i = 0; i < all.size(); i += 2) pressing[std::bit_cast<PatchId>(all[i])] = all[i + 1];
-  for (const auto& [patch, part] : pressing) balance.pressing += part;
+  balance.pressing = pressing.on_all(comm_)[0];
   const std::vector<double> sizes = sizes_of_bodies(*this, nets);
   for (const double size : sizes) balance.largest_net = std::max(balance.largest_net, size);
   MPI_Allreduce(MPI_IN_PLACE, &balance.largest_net, 1, MPI_DOUBLE, MPI_MAX, comm_);

@@ -170,6 +170,13 @@ double Simulation<Dim>::face_area(int face) const {
 }
 
 template <int Dim>
+double Simulation<Dim>::room() const {
+  double volume = 1;
+  for (int d = 0; d < Dim; ++d) volume *= face_distance(2 * d);
+  return volume;
+}
+
+template <int Dim>
 void Simulation<Dim>::end_tools() {
   for (Tool& tool : tools_) {
     tool.travel += dt_ * tool.of_step();
@@ -287,6 +294,7 @@ void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
   template void Simulation<Dim>::pull_by(const Vec3&);                      \
   template double Simulation<Dim>::face_distance(int) const;                \
   template double Simulation<Dim>::face_area(int) const;                    \
+  template double Simulation<Dim>::room() const;                            \
   template std::vector<double> Simulation<Dim>::impulse_on(int) const;      \
   template std::vector<ToolSum> Simulation<Dim>::tool_sums() const;
 CAIRN_INSTANTIATE(2)

@@ -1,15 +1,14 @@
-#include <bit>
-#include <map>
-
+#include "cairn/parallel/patch_sums.hpp"
 #include "cairn/solver/simulation.hpp"
 #include "point_budget.hpp"
 
 namespace cairn {
 namespace {
 
-// Of points: mass, that of deformable bodies, kinetic, spin, strain, potential, plastic and viscous energy, momentum.
-// Then the ledger, and of crack points: energy stored and dissipated.
-constexpr int point_sums = 11, ledger_sums = static_cast<int>(std::size(ledger_columns)), crack_sums = 2;
+// Of points: mass, that of deformable bodies, kinetic, spin, strain, potential, plastic and viscous energy, momentum,
+// stress times volume. Then the ledger, and of crack points: energy stored and dissipated.
+constexpr int stress_sums = 11, point_sums = stress_sums + 6, ledger_sums = static_cast<int>(std::size(ledger_columns)),
+              crack_sums = 2;
 constexpr int sum_count = point_sums + ledger_sums + crack_sums;
 using Sums = std::array<double, sum_count>;
 
@@ -24,8 +23,11 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, Sums&
         if (rigid) return;
         const double values[] = {b.mass,    b.kinetic, b.spin,        b.strain,      b.potential,
                                  b.plastic, b.viscous, b.momentum[0], b.momentum[1], b.momentum[2]};
-        for (int i = 1; i < point_sums; ++i) sums[i] += values[i - 1];
+        for (int i = 1; i < stress_sums; ++i) sums[i] += values[i - 1];
       });
+  if (rigid) return;
+  const auto stress = stress_of_points(piece, simulation.material_of(piece).density);
+  for (std::size_t i = 0; i < stress.size(); ++i) sums[stress_sums + i] += stress[i];
 }
 
 Totals totals_of(const Sums& sums) {
@@ -34,6 +36,7 @@ Totals totals_of(const Sums& sums) {
   t.plastic = sums[6], t.viscous = sums[7], t.momentum = Vec3(sums[8], sums[9], sums[10]);
   for (int i = 0; i < ledger_sums; ++i) t.*ledger_columns[i].value = sums[point_sums + i];
   t.crack_energy = sums[sum_count - crack_sums], t.crack_dissipation = sums[sum_count - crack_sums + 1];
+  std::copy_n(&sums[stress_sums], t.stress.size(), t.stress.begin());
   t.numerical = t.blended_and_spun - sums[3];
   return t;
 }
@@ -42,8 +45,7 @@ Totals totals_of(const Sums& sums) {
 
 template <int Dim>
 Totals Simulation<Dim>::totals() const {
-  // Partial sums of every patch go to rank 0, which adds them in patch order.
-  std::vector<double> mine;
+  PatchSums<sum_count> all;
   for (const auto& patch : patches_) {
     if (patch.blank()) continue;
     Sums sums{};
@@ -53,16 +55,11 @@ Totals Simulation<Dim>::totals() const {
       const auto energies = point.own ? energies_of(point) : std::array<double, crack_sums>{};
       for (int i = 0; i < crack_sums; ++i) sums[sum_count - crack_sums + i] += energies[i];
     }
-    mine.push_back(std::bit_cast<double>(patch.id));
-    mine.insert(mine.end(), sums.begin(), sums.end());
+    all.add(patch.id, sums);
   }
-  const std::vector<double> all = gather_on_first(mine, comm_);
-  std::map<PatchId, const double*> by_patch;
-  for (std::size_t i = 0; i < all.size(); i += 1 + sum_count) by_patch[std::bit_cast<PatchId>(all[i])] = &all[i + 1];
-  Sums sums{};
-  for (const auto& [patch, values] : by_patch)
-    for (int i = 0; i < sum_count; ++i) sums[i] += values[i];
-  return totals_of(sums);
+  Totals totals = totals_of(all.on_first(comm_));
+  for (double& s : totals.stress) s /= room();
+  return totals;
 }
 
 template Totals Simulation<2>::totals() const;

@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from harness import PATIENCE, ROOT, SKIP, Program, expect, expect_code, fresh_folder, run_tests, sets
+from harness import PATIENCE, ROOT, SKIP, Program, expect, expect_code, fresh_folder, load_compare_runs, run_tests, sets
 
 for package in ("numpy", "h5py", "matplotlib"):
     if importlib.util.find_spec(package) is None:
@@ -55,7 +55,8 @@ def test_momentum_of_each_step(cairn: Program, here: Path):
     programs = {"oedometer": (200, press), "die": (200, press), "isotropic": (350, {}), "biaxial": (300, {}),
                 "plane_shear": (200, {}), "soft_disks": (250, {"drive.0.velocity": "[0.0, -0.4]"}),
                 "column_collapse": (300, {}), "hopper": (650, fall)}
-    expect(set(programs) == {path.stem for path in CASES.glob("*.toml")}, "cases")
+    others = {"cell"}  # without tools: test_cell
+    expect(set(programs) | others == {path.stem for path in CASES.glob("*.toml")}, "cases")
     for name, (steps, more) in programs.items():
         found = run(cairn, here, name, EVERY_STEP | {"time.steps": steps} | more)
         rest, impulse = books(found)
@@ -65,6 +66,30 @@ def test_momentum_of_each_step(cairn: Program, here: Path):
     expect(history["mass_left"][-1] > 0, "nothing left the hopper")
     total = history["mass"] + history["mass_left"]
     expect(np.abs(total / total[0] - 1).max() < 1e-12, "mass was lost")
+
+
+def test_cell(cairn: Program, here: Path):
+    """A periodic domain without tools: compressed to a pressure, its stress held, then sheared; books close, and it goes
+    on from a checkpoint on another number of ranks to the same bits."""
+    settings = {"output.particles": "{}", "output.contacts": "{ interval = 0.05 }", "output.grains": "{ interval = 0.05 }",
+                "output.checkpoint": "{ every = 700, keep = 9 }", "stage.2.until.strain": 0.05}
+    found = run(cairn, here, "cell", settings)
+    history = found.history()
+    x, y = (history[f"length_{axis}"] for axis in "xy")
+    held = (history["time"] > 0.45) & (history["time"] > history["time"][np.argmax(x < 0.56)] + 0.2)
+    stress = history["stress_xx"][held]
+    print(f"cell: sigma_xx {stress.mean():.0f} Pa, rms {np.sqrt(((stress / -2000 - 1)**2).mean()):.2%}, "
+          f"energy error {np.abs(history['energy_error']).max():.1e}")
+    expect(abs(stress.mean() / -2000 - 1) < 0.02, f"the stress held is {stress.mean()}")
+    expect(y[-1] < 0.97 * 0.56 and x[-1] > x.min(), f"it was not sheared: {x[-1]}, {y[-1]}")
+    expect(np.abs(history["energy_error"][10:]).max() < 1e-3, "the energy book")
+    expect(np.abs([history["momentum_x"], history["momentum_y"]]).max() < 1e-9, "momentum")
+    out = here / "again"
+    expect_code(cairn("run", CASES / "cell.toml", "--out", out, "--restart", found.folder / "checkpoint_000000.h5",
+                      *sets(settings), ranks=2, timeout=400), 0)
+    last = sorted(found.folder.glob("grains_*.h5"))[-1].name
+    different = load_compare_runs().compare_files(found.folder / last, out / last)
+    expect(not different, f"after a restart {different}")
 
 
 YOUNGS, POISSON, SIDE, MOST, LEAST = 2.0e5, 0.3, 0.6, 0.009, 0.003  # of a block in the oedometer, and the lid's ways

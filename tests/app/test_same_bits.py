@@ -76,6 +76,8 @@ VARIATIONS = {
     "initial_pressure": {"bodies.0.initial_pressure": 50.0, "bodies.1.initial_pressure": -20.0},
     "driven": {"drive": "[{ ids = [1], velocity = [-1.0, 0.0], angular_velocity = 2.0 }]"},
     "periodic": {"domain.periodic": "[true, true]", "domain.upper": "[0.8, 0.8]", "domain.cells": "[20, 20]"},
+    "deforming": {"domain.periodic": "[true, true]", "domain.upper": "[0.8, 0.8]", "domain.cells": "[20, 20]",
+                  "domain.deform": "{ x = { strain_rate = -1.0 }, y = { stress = -200.0 } }"},
     "gravity_on_wall": {"boundary.bottom": '{ type = "wall", friction = 0.3 }', "domain.gravity": "[0.0, -9.0]",
                         "bodies.0.shape.centre": "[0.3537, 0.2013]"},
     "fixed_and_symmetry": {"boundary": '{ bottom = { type = "fixed", velocity = [0.5, 0.0] }, '

@@ -89,6 +89,59 @@ TEST_F(CaseFile, LaboratoriesReadBackToTheSameCase) {
   EXPECT_EQ(last.output.forces.interval, 0.5);
 }
 
+const std::string deforming = replaced(
+    base, "cells = [20, 10]",
+    "cells = [20, 10]\nperiodic = [true, true]\n"
+    "deform = { x = { strain_rate = \"-0.1 * t\" }, y = { stress = [[0.0, -5.0], [1.0, -9.0]], repeat = true } }");
+
+TEST_F(CaseFile, DomainsThatDeformReadBack) {
+  using By = AxisDeformation::By;
+  const Case c = read(deforming +
+                      "[[stage]]\nuntil = { strain = 0.1, of = \"domain\" }\n[[stage]]\n"
+                      "set.domain.deform.x.stress = -3.0\nset.domain.deform.y.viscosity = 7.0\n");
+  fs::create_directory(folder_ / "results");
+  ASSERT_EQ(write_case_files(c, folder_ / "results"), "");
+  const Case again = read_case(folder_ / "results" / "case.toml");
+  EXPECT_EQ(c.resolved, again.resolved);
+  const auto& axes = again.domain.deformation.axes;
+  EXPECT_EQ(axes[0].by, By::strain_rate);
+  EXPECT_DOUBLE_EQ(axes[0].target.at(2).x(), -0.2);
+  EXPECT_EQ(axes[1].by, By::stress);
+  EXPECT_DOUBLE_EQ(axes[1].target.at(1.5).x(), -7);
+  // The hardest material: density 1000, modulus K + 4/3 G = 1e6 / 3.
+  const double wave = std::sqrt(1e3 / 3), cell = 0.05;
+  EXPECT_NEAR(axes[1].viscosity, 4 * 1000 * wave * cell, 1e-9);
+  EXPECT_NEAR(axes[1].memory, 100 * cell / wave, 1e-12);
+  EXPECT_NEAR(axes[1].largest_rate, 9 / (1000 * wave), 1e-12);
+  EXPECT_FALSE(axes[2].active());
+  const auto& then = again.stages[1].changed->domain.deformation.axes;
+  EXPECT_EQ(then[0].by, By::stress);
+  EXPECT_EQ(then[0].target.at(0).x(), -3);
+  EXPECT_EQ(then[1].viscosity, 7);
+}
+
+TEST_F(CaseFile, DomainsThatCannotDeformAreRefused) {
+  const auto refused = [&](const std::string& text, const std::string& what) {
+    const auto lines = errors(text);
+    ASSERT_FALSE(lines.empty()) << text;
+    EXPECT_NE(lines[0].find(what), std::string::npos) << lines[0] << "\nexpected " << what;
+  };
+  const auto with = [&](const std::string& deform) {
+    return replaced(base, "cells = [20, 10]", "cells = [20, 10]\nperiodic = [true, false]\ndeform = " + deform);
+  };
+  refused(with("{ y = { stress = 1.0 } }"), "direction y is not periodic");
+  refused(with("{ x = { stress = 1.0, strain_rate = 2.0 } }"), "give one of the two");
+  refused(with("{ x = { viscosity = 1.0 } }"), "strain_rate: is missing");
+  refused(with("{ x = { strain_rate = 1.0, viscosity = 1.0 } }"), "viscosity");
+  refused(with("{ z = { strain_rate = 1.0 } }"), "z");
+  refused(with("{}"), "give x, y or z");
+  refused(replaced(deforming, "[time]", "gravity = [0.0, -9.81]\n[time]"), "no bottom");
+  refused(deforming + "[solver]\nshape = \"cpdi\"\n", "cpdi");
+  refused(deforming + "[[drive]]\nids = [0]\nvelocity = [1.0, 0.0]\n", "driven bodies");
+  refused(deforming + "[[cracks]]\npoints = [[0.2, 0.5], [0.5, 0.5]]\n", "cracks");
+  refused(base + "[[stage]]\nuntil = { strain = 0.1, of = \"domain\" }\n", "domain");
+}
+
 TEST_F(CaseFile, LaboratoriesThatCannotBeAreRefused) {
   write("more.csv", "x,y,r\n0.2,0.6,0.05\n");
   const auto refuse = [&](const std::string& key, const std::string& value, const std::string& start,

@@ -47,6 +47,9 @@ class Lattice {
   /// face onto the last position inside; others stay. Returns the periods taken off: -1, 0 or 1.
   int wrap(int d, double& x) const;
 
+  /// Gives the domain another upper corner [m]; cells and patches stay.
+  void set_upper(const Vec<Dim>& upper);
+
   PatchId patch_count() const { return patch_count_; }
   Index<Dim> patch_position(PatchId patch) const;
   PatchId patch_at(const Index<Dim>& position) const;
@@ -68,6 +71,7 @@ class Lattice {
   std::vector<Link<Dim>> unpaired_links(PatchId patch) const;
 
  private:
+  void measure();  // spacing and what follows from it
   double last_inside(int d) const;
 
   Vec<Dim> lower_, upper_, spacing_, inverse_;

@@ -2,6 +2,8 @@
 /// The case: everything a run needs, parsed, checked and with all defaults filled in (INTERFACE: docs/case-file.md).
 /// Vectors have three components whatever the dimension; z is 0 in 2D. SI units.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -19,6 +21,22 @@
 
 namespace cairn {
 
+/// How the length of a periodic domain along an axis changes.
+struct AxisDeformation {
+  enum class By { nothing, strain_rate, stress } by = By::nothing;
+  MotionTable target;       // x: strain rate [1/s], or the mean stress, positive in tension [Pa]
+  double viscosity = 0;     // of a stress: how much of it is missing for a strain rate of 1 [Pa s]
+  double memory = 0;        // of a stress: the time in which one that is missing doubles that rate [s]
+  double largest_rate = 0;  // of a stress [1/s]
+  bool active() const { return by != By::nothing; }
+};
+
+/// A periodic domain that deforms, and all that is in it with it.
+struct Deformation {
+  std::array<AxisDeformation, 3> axes;
+  bool active() const { return std::ranges::any_of(axes, &AxisDeformation::active); }
+};
+
 struct Domain {
   int dimension = 2;
   Vec3 lower = Vec3::Zero(), upper = Vec3::Zero();  // [m]
@@ -26,10 +44,15 @@ struct Domain {
   std::array<bool, 3> periodic = {false, false, false};
   MotionTable gravity;  // [m/s2]
   int patch_cells = 0;  // 32 in 2D, 16 in 3D unless given
+  Deformation deformation;
 };
 
 /// The shortest side of a cell [m].
 double smallest_cell(const Domain& domain);
+
+/// The name of a domain that deforms where a tool is named: its strain is the largest of its axes', its pressure the
+/// negative mean of the stresses along them.
+inline constexpr const char* whole_domain = "domain";
 
 /// What ends a stage, or the run: any of what is given. Forces are means since the last look.
 struct Until {

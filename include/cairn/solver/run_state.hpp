@@ -35,6 +35,8 @@ struct RunState {
 template <class State, class F>
 void for_each_number(State& s, F&& f) {
   f("kinetic", s.step.kinetic[0]), f("kinetic_before", s.step.kinetic[1]);
+  f("upper_x", s.step.upper[0]), f("upper_y", s.step.upper[1]), f("upper_z", s.step.upper[2]);
+  f("rate_x", s.step.needed_rates[0]), f("rate_y", s.step.needed_rates[1]), f("rate_z", s.step.needed_rates[2]);
   f("dt", s.step.dt), f("wave_speed", s.step.wave_speed), f("point_speed", s.step.point_speed);
   const auto clock = [&](const std::string& name, auto& c) {
     f(name + "_last_step", c.last_step), f(name + "_last_time", c.last_time);

@@ -38,6 +38,7 @@ struct Totals : PatchLedger {
   double numerical = 0;                                        // [J], lost by blending with PIC and in spins
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0, deformable_mass = 0;                        // [kg]
+  std::array<double, 6> stress{};                              // stress_of_points over the room between the faces [Pa]
   double energy() const {
     return kinetic + strain + potential + plastic + viscous + crack_energy + crack_dissipation + contact_dissipation +
            numerical + filtered + damped + energy_left - boundary_work;
@@ -49,7 +50,9 @@ struct StepState {
   double time = 0, dt = 0;                 // dt: of the last step [s]
   double wave_speed = 0, point_speed = 0;  // largest over all points, for the next dt [m/s]
   std::int64_t steps = 0;
-  std::array<double, 2> kinetic{};  // energy after the last two steps, while bodies relax [J]
+  std::array<double, 2> kinetic{};   // energy after the last two steps, while bodies relax [J]
+  Vec3 upper = Vec3::Zero();         // corner of the domain, which may deform [m]
+  Vec3 needed_rates = Vec3::Zero();  // at which a domain that deforms holds its stresses [1/s]
 };
 
 /// What ranks tell each other along with the speeds; the largest of each counts. It costs no communication of its own.
@@ -66,6 +69,12 @@ struct ForceBalance {
   double mean() const { return pressing > 0 ? net / pressing : 0; }
   double largest() const { return pressing > 0 ? largest_net * static_cast<double>(bodies) / pressing : 0; }
 };
+
+/// sum over a piece's points of V sigma - m v (x) v, whose mean over the volume is the mean stress of a granular body:
+/// in statics that of the contact forces (Love 1927, Weber 1966), and in a periodic domain the virial (xx yy zz xy yz
+/// xz) [J].
+template <int Dim>
+std::array<double, 6> stress_of_points(const Piece<Dim>& piece, double density);
 
 /// A crack's tip and what drives it.
 struct TipState {
@@ -144,8 +153,12 @@ class Simulation {
   double face_area(int face) const;
   /// From a face to the opposite one, where they stand [m].
   double face_distance(int face) const;
+  /// Volume between the faces, where they stand [m^Dim].
+  double room() const;
   /// Volume of all bodies over that between the faces. Collective.
   double packing_fraction() const;
+  /// stress_of_points of all deformable bodies over room() [Pa]. Collective.
+  std::array<double, 6> mean_stress() const;
   /// Has the steps from now on weigh forces for force_balance().
   void keep_balance(bool keep) { keep_balance_ = keep; }
   /// Of the last step, the same on every rank.
@@ -224,6 +237,12 @@ class Simulation {
   bool has_room(const Shape& shape) const;
   void place_body(int body, const Shape& shape);
   void restore_pouring(const std::vector<double>& state);
+
+  // A periodic domain that deforms (deform.cpp).
+  void deform();  // communicates, where a stress is asked for
+  Vec<Dim> strain_rates();
+  void deform_by(const Vec<Dim>& strain);
+  void place_corner(const Vec<Dim>& upper);
 
   // What takes motion away, and what is left over of forces (damping.cpp).
   void weigh_forces(Patch<Dim>& patch);
@@ -383,6 +402,8 @@ class Simulation {
   std::int64_t next_id_ = 0;     // of points
   MotionTable gravity_;
   DampingOptions damping_;
+  Deformation deformation_;
+  Vec3 needed_rates_ = Vec3::Zero();  // StepState::needed_rates
   bool keep_balance_ = false;
   ForceBalance balance_;
   std::array<double, 2> kinetic_{};  // StepState::kinetic, the latest first

@@ -89,6 +89,12 @@ template <int Dim>
 void update_stress(Piece<Dim>& piece, const Lattice<Dim>& lattice, const TransferSettings<Dim>& settings,
                    const Law& law, double density, double dt, SpeedLimits& speeds);
 
+/// Points: deformation gradient and stress of a strain that is the same everywhere, F <- (1 + diag(strain)) F. Raises
+/// `speeds.wave`.
+template <int Dim>
+void strain_alike(Piece<Dim>& piece, const Law& law, double density, const Vec<Dim>& strain, double dt,
+                  SpeedLimits& speeds);
+
 /// nodes -> points: strain over `dt`, deformation gradient and stress; points -> nodes: the force of the new stress, in
 /// the same pass. Raises `speeds.wave`.
 template <int Dim>
