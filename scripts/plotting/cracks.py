@@ -49,7 +49,7 @@ def cracks(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str
     figure, row = plt.subplots(1, 2, figsize=(14, 7))
     for axes, frame in zip(row, frames):
         faces(run, frame)
-        figures._show(axes, run, *figures.grain_picture(run, frame), f"{run.title}, {figures.label(run, frame)}")
+        figures._show(axes, run, figures.grain_picture(run, frame), f"{run.title}, {figures.label(run, frame)}")
         draw_faces(axes, run, frame)
         for d, limits in enumerate((axes.set_xlim, axes.set_ylim)):
             limits(figures.length_unit(run)[0] * run.lower[d], figures.length_unit(run)[0] * run.upper[d])

@@ -40,7 +40,7 @@ class Moment:
     """Bodies and contacts at the time of a frame."""
 
     def __init__(self, run: Run, shapes: Shapes, frame: Frame):
-        self.run, self.frame = run, frame
+        self.run, self.frame = run.at(frame), frame
         self.bodies: Bodies = shapes.at(frame)
         self.contacts: Frame | None = run.file_at(run.contact_files, frame.time) if run.contact_files else None
 

@@ -55,7 +55,7 @@ def pixels_of(run: Run, frame: Frame, pixels: int) -> raster.Pixels:
     if frame.points == 0:
         raise MissingData(f"{frame.path.name} holds no points")
     position = frame.field("position")[:, :2]
-    return raster.Pixels(position, run.point_spacing, run.lower, run.upper, run.periodic, pixels)
+    return raster.Pixels(position, run.point_spacing, run.lower, run.at(frame).upper, run.periodic, pixels)
 
 
 def bodies_of(frame: Frame) -> np.ndarray:
@@ -110,7 +110,7 @@ def _draw_grains(run: Run, frame: Frame, folder: Path, name: str) -> str:
         Scene(run, replace(run.look, colour="body"), [frame]).sheet(frame, _title(run, frame)).image.save(folder / name)
         return name
     figure, axes = plt.subplots(figsize=(7, 7))
-    _show(axes, run, grain_picture(run, frame), _title(run, frame))
+    _show(axes, run.at(frame), grain_picture(run, frame), _title(run, frame))
     return _save(figure, folder, name)
 
 
@@ -123,7 +123,7 @@ def _draw_pair(pair: list[tuple[Run, Frame]], folder: Path, name: str) -> str:
         return name
     figure, row = plt.subplots(1, 2, figsize=(14, 7))
     for axes, (run, frame) in zip(row, pair):
-        _show(axes, run, grain_picture(run, frame), _title(run, frame))
+        _show(axes, run.at(frame), grain_picture(run, frame), _title(run, frame))
     return _save(figure, folder, name)
 
 
@@ -186,7 +186,7 @@ def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -
     scale = (0.0, top if top > 0 else 1.0, "stress")
     figure, row = plt.subplots(1, len(frames), figsize=(7 * len(frames), 7), squeeze=False)
     for axes, frame, value in zip(row[0], frames, values):
-        _show(axes, run, value_picture(run, frame, value, scale), _title(run, frame))
+        _show(axes, run.at(frame), value_picture(run, frame, value, scale), _title(run, frame))
     _scale_bar(figure, list(row[0]), *scale, shown)
     summary["principal_stress_scale_Pa"] = top
     summary["principal_stress_field"] = run.stress_name(frames[0])
@@ -208,6 +208,7 @@ def stress_inside(run: Run, other: Run | None, folder: Path, summary: dict) -> l
 def force_chains(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
     """The contacts over the bodies, lines as wide as forces are large, at the last time at which anything touches."""
     contacts, frame = loaded(run)
+    run = run.at(frame)
     net = network(run, contacts, frame)
     summary["contacts"] = {"time_s": contacts.time, "count": net.contacts, "mean_force_N": net.mean}
     if run.dimension == 3:
@@ -254,7 +255,7 @@ def values(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str
     scale = scale_of(run, frames, shown, run.look.range)
     for frame, name in zip(frames, names):
         figure, axes = plt.subplots(figsize=(8, 7))
-        _show(axes, run, value_picture(run, frame, shown.values(run, frame), scale), _title(run, frame))
+        _show(axes, run.at(frame), value_picture(run, frame, shown.values(run, frame), scale), _title(run, frame))
         _scale_bar(figure, [axes], *scale, shown)
         _save(figure, folder, name)
     return names

@@ -54,11 +54,15 @@ def _drawer(run: Run) -> Callable[[Frame], Image.Image]:
     scales = [ends and (*ends[:2], "stress" if shown is SCALARS["difference"] else ends[2])
               for ends, shown in zip(scales, panels)]
 
+    sizes = [run.at(frame).upper - run.lower for frame in run.frames]
+    largest = np.max(sizes, axis=0)
+
     def draw(frame: Frame) -> Image.Image:
         row = []
         for shown, ends in zip(panels, scales):
             picture = (value_picture(run, frame, shown.values(run, frame), ends, pixels) if shown
                        else grain_picture(run, frame, pixels, colour))
+            picture = _in_domain(picture, run.at(frame).upper - run.lower, largest)
             title = shown.title if shown and row else f"{run.title}   {label(run, frame)}"
             sheet = Sheet(picture[::-1] / 255.0, title, run.failed, scale=shown is not None)
             if shown:
@@ -67,6 +71,18 @@ def _drawer(run: Run) -> Callable[[Frame], Image.Image]:
         return beside(row)
 
     return draw
+
+
+def _in_domain(picture: np.ndarray, size: np.ndarray, largest: np.ndarray) -> np.ndarray:
+    """A picture of a domain (rows upwards) of a size, on white, on the scale of the largest of a film."""
+    if np.array_equal(size, largest):
+        return picture
+    longer = max(picture.shape[:2])
+    full = np.full((*np.rint(largest[::-1] / largest.max() * longer).astype(int), 3), 255, picture.dtype)
+    there = np.maximum(np.rint(size / largest.max() * longer).astype(int), 1)
+    scaled = np.asarray(Image.fromarray(picture).resize((int(there[0]), int(there[1]))))
+    full[: scaled.shape[0], : scaled.shape[1]] = scaled[: full.shape[0], : full.shape[1]]
+    return full
 
 
 _draw: Callable[[Frame], Image.Image]  # of the worker processes, which are forks

@@ -31,7 +31,7 @@ def fringe_picture(run: Run, frame: Frame, parameter: float, pixels: int = PIXEL
     if run.dimension != 2:
         raise MissingData("photoelastic pictures are drawn for two dimensions only")
     position = frame.field("position")[:, :2]
-    owner = raster.nearest_point(position, run.point_spacing, run.lower, run.upper, run.periodic, pixels)
+    owner = raster.nearest_point(position, run.point_spacing, run.lower, run.at(frame).upper, run.periodic, pixels)
     return np.where(owner >= 0, fringes(run.stress(frame), parameter)[owner], VOID)
 
 

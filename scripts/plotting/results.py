@@ -5,6 +5,7 @@ All quantities are in SI units. In two dimensions volumes are areas [m2] (plane 
 
 from __future__ import annotations
 
+import copy
 import csv
 import json
 import tomllib
@@ -156,6 +157,15 @@ class Run:
         history = self.history()
         return self.lower + [np.interp(time, history["time"], history[f"length_{axis}"])
                              for axis in "xyz"[: self.dimension]]
+
+    def at(self, frame: Frame) -> Run:
+        """The run with the domain as it was at the time of a frame."""
+        upper = self.upper_at(frame.time)
+        if upper is self.upper:
+            return self
+        then = copy.copy(self)
+        then.upper = upper
+        return then
 
     def _has_failed(self) -> bool:
         """Whether the last run into this folder failed: it says so itself, or it left its last state."""
@@ -357,7 +367,7 @@ def smoothed(run: Run, frame: Frame, values: np.ndarray) -> np.ndarray:
     position = frame.field("position")[:, : run.dimension]
     body = frame.field("body") if frame.has("body") else np.zeros(frame.points, int)
     volume = frame.field("volume") if frame.has("volume") else np.ones(frame.points)
-    lattice = Lattice(position, body, SPACING_TO_CELL * run.point_spacing, run.lower, run.upper, run.periodic)
+    lattice = Lattice(position, body, SPACING_TO_CELL * run.point_spacing, run.lower, run.at(frame).upper, run.periodic)
     nodal = lattice.to_nodes(np.column_stack([values * volume[:, None], volume]))
     return lattice.to_points(nodal[:, :-1] / np.maximum(nodal[:, -1:], 1e-300))
 
@@ -385,5 +395,5 @@ def unwrapped(run: Run, frame: Frame) -> np.ndarray:
     """Positions [m] that go on across periodic faces (N x dimension)."""
     position = frame.field("position")[:, : run.dimension].astype(float)
     if run.periodic.any():
-        position = position + frame.field("image")[:, : run.dimension] * (run.upper - run.lower) * run.periodic
+        position = position + frame.field("image")[:, : run.dimension] * (run.at(frame).upper - run.lower) * run.periodic
     return position

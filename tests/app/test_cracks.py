@@ -3,6 +3,7 @@
     test_cracks.py CAIRN SCRATCH
 """
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -134,6 +135,12 @@ def check_growth(cairn: Program, case: Path, scratch: Path) -> list[str]:
     return failures
 
 
+def check_pictures(folder: Path) -> list[str]:
+    done = subprocess.run([ROOT / "scripts" / "plot", folder], capture_output=True, text=True, check=False, timeout=300)
+    missing = [name for name in ("cracks.png", "tips.png") if not (folder / "pictures" / name).is_file()]
+    return [f"scripts/plot: {missing} are missing: {done.stdout}{done.stderr}"] if missing else []
+
+
 def check_same_bits(cairn: Program, case: Path, scratch: Path) -> list[str]:
     failures = []
     for ranks in (1, 2, 3, 5):
@@ -192,7 +199,7 @@ def main() -> int:
     failures = check_same_bits(cairn, case, scratch)
     failures = failures or check_restart(cairn, case, scratch)
     case.write_text(plain + GROWING)
-    failures += check_growth(cairn, case, scratch)
+    failures += check_growth(cairn, case, scratch) or check_pictures(scratch / "growing_1")
     failures += check_errors(cairn, plain, scratch)
     for failure in failures:
         print(failure)
