@@ -125,13 +125,18 @@ void ContactSweep<Dim>::keep_contacts(const Node& node, Patch<Dim>& patch, const
     Vec<Dim> sliding = Vec<Dim>::Zero();
     if (wall || pair.b != pair.none) sliding = contact::tangential<Dim>(relative_velocity(node, pair), pair.normal);
     double* sum = patch.contacts[std::minmax(body, other)].values.data();
+    Vec<Dim> place;  // as seen from where the contact was so far: it may lie across a periodic boundary
+    for (int d = 0; d < Dim; ++d) {
+      place[d] = lattice.node_position(d, node.place[d]);
+      if (sum[0] > 0) place[d] -= lattice.periods_between(d, place[d], sum[S::place + d] / sum[0]);
+    }
     sum[0] += size;
     for (int d = 0; d < Dim; ++d) {
       const double impulse = sign * node.share * pair.second[d];
       sum[S::impulse + d] += impulse;
-      sum[S::place + d] += size * lattice.node_position(d, node.place[d]);
+      sum[S::place + d] += size * place[d];
       sum[S::normal + d] += sign * size * pair.normal[d];
-      for (int j = 0; j < Dim; ++j) sum[S::moment + d * Dim + j] += impulse * lattice.node_position(j, node.place[j]);
+      for (int j = 0; j < Dim; ++j) sum[S::moment + d * Dim + j] += impulse * place[j];
     }
     sum[S::slip] += size * dt * sliding.norm();
     sum[S::friction] -= node.share * pair.second.dot(sliding);

@@ -197,9 +197,8 @@ std::vector<ContactState> contact_states(const Simulation<Dim>& simulation, doub
     // A contact may lie across a periodic boundary: bring the parts together before their positions are averaged.
     for (int d = 0; d < Dim; ++d) {
       const int at = S::place + d;
-      const double length = simulation.lattice().length(d);
-      if (!simulation.lattice().periodic(d) || !(sum[0] > 0)) continue;
-      const double shift = length * std::round((values[at] / values[0] - sum[at] / sum[0]) / length);
+      if (!(sum[0] > 0)) continue;
+      const double shift = simulation.lattice().periods_between(d, values[at] / values[0], sum[at] / sum[0]);
       sum[at] -= values[0] * shift;
       for (int i = 0; i < Dim; ++i) sum[S::moment + i * Dim + d] -= values[S::impulse + i] * shift;
     }

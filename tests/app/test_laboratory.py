@@ -55,7 +55,7 @@ def test_momentum_of_each_step(cairn: Program, here: Path):
     programs = {"oedometer": (200, press), "die": (200, press), "isotropic": (350, {}), "biaxial": (300, {}),
                 "plane_shear": (200, {}), "soft_disks": (250, {"drive.0.velocity": "[0.0, -0.4]"}),
                 "column_collapse": (300, {}), "hopper": (650, fall)}
-    others = {"cell"}  # without tools: test_cell
+    others = {"cell", "triaxial"}  # without tools: test_cell, test_triaxial
     expect(set(programs) | others == {path.stem for path in CASES.glob("*.toml")}, "cases")
     for name, (steps, more) in programs.items():
         found = run(cairn, here, name, EVERY_STEP | {"time.steps": steps} | more)
@@ -90,6 +90,18 @@ def test_cell(cairn: Program, here: Path):
     last = sorted(found.folder.glob("grains_*.h5"))[-1].name
     different = load_compare_runs().compare_files(found.folder / last, out / last)
     expect(not different, f"after a restart {different}")
+
+
+def test_triaxial(cairn: Program, here: Path):
+    """Spheres in a domain that shortens along all axes: the lengths are those of the rate, stresses are pressures."""
+    found = run(cairn, here, "triaxial", {"output": "{ history = { every = 10 } }", "domain.deform.y.strain_rate": -1.0,
+                                          "time.end": 0.1})
+    history = found.history()
+    for axis, rate in zip("xyz", (-0.5, -1.0, -0.5)):
+        length = 0.4 * np.exp(rate * history["time"])
+        expect(np.abs(history[f"length_{axis}"] / length - 1).max() < 1e-6, f"length_{axis}")
+        expect(history[f"stress_{axis}{axis}"][-1] < -30, f"stress_{axis}{axis}")
+    expect(np.abs(history["energy_error"][-5:]).max() < 5e-3, f"{history['energy_error']}")
 
 
 YOUNGS, POISSON, SIDE, MOST, LEAST = 2.0e5, 0.3, 0.6, 0.009, 0.003  # of a block in the oedometer, and the lid's ways

@@ -67,6 +67,30 @@ TEST(BodyStates, CutSurfacesKeepMassAndCentre) {
 }
 
 // Two halves of a square whose common face goes through points, along the grid or across it: each point is of one half.
+/// Two balls that meet across a boundary touch there, however the domain is cut into patches: the same point, and the
+/// same sum of force times place about it.
+TEST(BodyStates, AContactAcrossAPeriodicBoundaryLiesThere) {
+  Eigen::Matrix2d moments[2];
+  for (const int patch_cells : {4, 24}) {
+    Case c = soft_case(2, 24, patch_cells);
+    c.domain.periodic = {true, false, false};
+    c.output.contacts.every = 1;
+    add_body(c, Ball{Vec3(0.795, 0.5, 0), 0.2}, Vec3(0.5, 0, 0));
+    add_body(c, Ball{Vec3(0.205, 0.52, 0), 0.2}, Vec3(-0.5, 0, 0));
+    Simulation<2> simulation(c, MPI_COMM_WORLD);
+    for (int i = 0; i < 40; ++i) simulation.step(1e300);
+    const auto contacts = contact_states(simulation, simulation.time());
+    ASSERT_EQ(contacts.size(), 1u);
+    const ContactState& contact = contacts[0];
+    EXPECT_GT(contact.force.norm(), 1);
+    EXPECT_LT(std::abs(contact.point.x() - std::round(contact.point.x())), 0.03) << patch_cells;
+    EXPECT_NEAR(contact.point.y(), 0.51, 0.03);
+    moments[patch_cells == 24] = (contact.moment - contact.force * contact.point.transpose()).topLeftCorner<2, 2>();
+  }
+  EXPECT_LT(moments[0].norm(), 20);
+  EXPECT_LT((moments[0] - moments[1]).norm(), 1e-9 * moments[0].norm());
+}
+
 TEST(BodyStates, BodiesThatTouchShareNoPoints) {
   for (double middle : {0.5 + 0.25 / 24, 0.5 + 0.75 / 24, 0.51})
     for (bool polygons : {false, true}) {

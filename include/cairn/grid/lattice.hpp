@@ -2,6 +2,7 @@
 /// The background lattice and its division into patches. A patch is a box of cells: the unit of distribution and of
 /// load balance. Patch size belongs to the case, never to the rank count.
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -43,6 +44,10 @@ class Lattice {
   double scaled(int d, double x) const { return (x - lower_[d]) * inverse_[d]; }
   double node_position(int d, int i) const { return lower_[d] + i * spacing_[d]; }
 
+  /// The whole periods by which a position is away from another one [m]; 0 in a direction that is not periodic.
+  double periods_between(int d, double x, double other) const {
+    return periodic_[d] ? length(d) * std::round((x - other) / length(d)) : 0.0;
+  }
   /// Brings a position [m] that is less than a period outside a periodic direction inside, a rounding error short of a
   /// face onto the last position inside; others stay. Returns the periods taken off: -1, 0 or 1.
   int wrap(int d, double& x) const;
