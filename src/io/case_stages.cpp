@@ -29,6 +29,7 @@ constexpr std::string_view changing_keys[] = {"domain.gravity",
                                               "drive.*.repeat",
                                               "drive.*.piston",
                                               "drive.*.servo",
+                                              "drive.*.rotor",
                                               "damping",
                                               "output"};
 

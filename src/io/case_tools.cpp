@@ -133,6 +133,23 @@ void read_piston(Table& parent, const Place& place, StressUpdate update, Piston&
   table.finish();
 }
 
+/// A wheel on the shaft at `about`.
+void read_rotor(Table& parent, const Case& c, bool about, Piston& rotor) {
+  Table table = parent.table("rotor");
+  if (!table.present()) return;
+  check_update(table, c.solver.stress_update);
+  rotor.mass = table.number("inertia", std::nullopt, positive);
+  rotor.force = table.motion("moment", 1);
+  rotor.force.repeat = table.boolean("repeat", false) && !rotor.force.times.empty();
+  rotor.damping = table.number("damping", 0.0, not_negative);
+  rotor.along = Vec3::UnitZ();
+  if (c.domain.dimension == 3) rotor.along = table.vector("axis", 3, std::nullopt);
+  if (rotor.along == Vec3::Zero()) table.error("axis", "has no direction; it must not be zero");
+  rotor.along.normalize();
+  if (!about) parent.missing("about", "is missing; a rotor turns about a point");
+  table.finish();
+}
+
 Place place_in(const Case& c, int face) {
   const Hardness hardness = hardness_of(c.materials);
   Place place{c.domain.dimension,
@@ -157,6 +174,7 @@ void read_motion(Table& table, const Draft& draft, Drive& drive) {
   drive.angular_velocity.repeat = repeat && !drive.angular_velocity.times.empty();
   if (table.has("about")) drive.about = table.vector("about", dimension, std::nullopt);
   read_piston(table, place_in(c, -1), c.solver.stress_update, drive.piston);
+  read_rotor(table, c, drive.about.has_value(), drive.rotor);
 }
 
 /// Which faces the case may give: those of periodic directions and of the third dimension in 2D may not.

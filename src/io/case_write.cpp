@@ -142,12 +142,18 @@ class Writer {
                        : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
     return text + " }";
   }
+  std::string rotor_of(const Piston& r) const {
+    return fmt::format("rotor = {{ inertia = {}, moment = {}{}, damping = {}{} }}", text_of(r.mass),
+                       table_of(r.force, 0, 1), r.force.repeat ? ", repeat = true" : "", text_of(r.damping),
+                       dim_ == 3 ? ", axis = " + list_of(r.along, 3) : "");
+  }
   void drive(const Drive& d) {
     raw("velocity", table_of(d.velocity, 0, dim_));
     raw("angular_velocity", table_of(d.angular_velocity, dim_ == 3 ? 0 : 2, dim_ == 3 ? 3 : 1));
     if (d.velocity.repeat || d.angular_velocity.repeat) key("repeat", true);
     if (d.about) vector("about", *d.about);
     if (d.piston.mass > 0) text_ += piston_of(d.piston, true) + "\n";
+    if (d.rotor.mass > 0) text_ += rotor_of(d.rotor) + "\n";
   }
   void face(std::string_view name, const Face& f) {
     std::string text = fmt::format("{{ type = \"{}\"", name_of(face_type_names, f.type));

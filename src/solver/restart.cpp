@@ -58,7 +58,7 @@ std::unique_ptr<Checkpoint> open_latest(const fs::path& out, MPI_Comm comm) {
 /// Turning rigid bodies turn about centres that follow from their velocities since the start.
 bool turns_rigidly(const Case& c) {
   const auto turns = [](const BodySpec& body) { return body.angular_velocity != Vec3::Zero(); };
-  const auto spins = [](const Drive& drive) { return !drive.angular_velocity.is_zero(); };
+  const auto spins = [](const Drive& drive) { return drive.rotor.mass > 0 || !drive.angular_velocity.is_zero(); };
   return std::ranges::any_of(c.drives, spins) || std::ranges::any_of(c.bodies, [&](const BodySpec& body) {
            return c.materials[body.material].model == "rigid" && turns(body);
          });

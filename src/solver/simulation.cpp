@@ -78,7 +78,7 @@ void Simulation<Dim>::step(double longest) {
       update_momentum(p, patch);
       accelerate_points(patch);
     });
-    push_pistons();
+    push_tools();
   }
   aim_walls();
   migrate_after([&](std::size_t p, P& patch) {

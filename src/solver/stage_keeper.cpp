@@ -59,6 +59,7 @@ void apply_stage(Case& c, const RunStage& stage, double since) {
     replace(c.drives[d].velocity, by.drives[d].velocity, since);
     replace(c.drives[d].angular_velocity, by.drives[d].angular_velocity, since);
     replace(c.drives[d].piston, by.drives[d].piston, since);
+    replace(c.drives[d].rotor, by.drives[d].rotor, since);
   }
   c.contact = by.contact, c.damping = by.damping, c.output = by.output;
   c.time.cfl = by.time.cfl, c.time.dt = by.time.dt;

@@ -12,9 +12,9 @@ void Simulation<Dim>::keep_what_is_asked(const Case& c) {
   moved_bodies_.clear();
   for (std::size_t b = 0; b < bodies_.size(); ++b)
     if (bodies_[b].tool >= 0 && tools_[bodies_[b].tool].moves()) moved_bodies_.push_back(static_cast<int>(b));
-  has_pistons_ = std::ranges::any_of(tools_, [](const Tool& tool) { return tool.piston.mass > 0; });
+  pushed_tools_ = std::ranges::any_of(tools_, &Tool::is_pushed);
   const auto asks = [](const Until& u) { return std::isfinite(u.force) || std::isfinite(u.pressure); };
-  contact_.keep_tools = c.output.forces.active() || has_pistons_ || asks(c.time.until);
+  contact_.keep_tools = c.output.forces.active() || pushed_tools_ || asks(c.time.until);
   contact_.keep_contacts = c.output.grains.active() || c.output.contacts.active();
   for (const RunStage& stage : c.stages) {
     const Output& output = stage.changed->output;
@@ -50,7 +50,12 @@ void Simulation<Dim>::change(const Case& c) {
     if (piston.mass == 0) tool.speed = 0;
     tool.piston = piston;
     tool.now = tool.next = given + tool.speed * piston.along;
-    tool.spin_now = tool.spin_next = tool.spin.at(time_);
+    const Piston rotor = face ? Piston() : drive->rotor;
+    const Vec3 given_spin = tool.spin.at(time_);
+    if (rotor.mass > 0 && tool.rotor.mass == 0) tool.turning = (tool.spin_now - given_spin).dot(rotor.along);
+    if (rotor.mass == 0) tool.turning = 0;
+    tool.rotor = rotor;
+    tool.spin_now = tool.spin_next = given_spin + tool.turning * rotor.along;
     maxima_[1] = std::max(maxima_[1], tool.now.norm());
   }
   keep_what_is_asked(c);

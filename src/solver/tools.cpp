@@ -55,8 +55,12 @@ std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
   }
   for (std::size_t d = 0; d < c.drives.size(); ++d) {
     const Drive& drive = c.drives[d];
-    Tool tool{drive.group.empty() ? fmt::format("drive{}", d) : drive.group, Vec3::Zero(), drive.velocity,
-              drive.angular_velocity, drive.piston};
+    Tool tool{drive.group.empty() ? fmt::format("drive{}", d) : drive.group,
+              Vec3::Zero(),
+              drive.velocity,
+              drive.angular_velocity,
+              drive.piston,
+              drive.rotor};
     int count = 0;
     for (std::size_t b = 0; b < bodies.size(); ++b)
       if (selects(drive, c.bodies[b], static_cast<int>(b), c.domain)) {
@@ -83,7 +87,7 @@ void Simulation<Dim>::begin_tools() {
   for (Tool& tool : tools_) {
     if (!tool.moves()) continue;
     tool.next = tool.velocity.at(time_ + dt_) + tool.speed * tool.piston.along;
-    tool.spin_next = tool.spin.at(time_ + dt_);
+    tool.spin_next = tool.spin.at(time_ + dt_) + tool.turning * tool.rotor.along;
   }
   for (const int b : moved_bodies_) bodies_[b].change = tools_[bodies_[b].tool].next - tools_[bodies_[b].tool].now;
   for (int face = 0; face < 2 * Dim; ++face)
@@ -104,23 +108,28 @@ std::vector<double> Simulation<Dim>::tool_records(Wanted&& wanted) const {
   return records;
 }
 
-/// What bodies press in this step moves the pistons. Collective where there are some.
+/// What bodies press in this step moves pistons and rotors. Collective where there are some.
 template <int Dim>
-void Simulation<Dim>::push_pistons() {
-  if (!has_pistons_) return;
-  const auto pushed = [&](int tool) { return tools_[tool].piston.mass > 0; };
+void Simulation<Dim>::push_tools() {
+  if (!pushed_tools_) return;
+  const auto pushed = [&](int tool) { return tools_[tool].is_pushed(); };
   const std::vector<ToolSum> sums = sum_in_order(gather_on_all(tool_records(pushed), comm_), tools_.size());
   for (std::size_t t = 0; t < tools_.size(); ++t) {
     Tool& tool = tools_[t];
-    const Piston& piston = tool.piston;
-    if (piston.mass == 0) continue;
-    const Vec3 pressed(sums[t].last[0], sums[t].last[1], sums[t].last[2]);
-    double force = piston.force.at(time_).x();
-    if (piston.pressure) force *= piston.area > 0 ? piston.area : face_area(static_cast<int>(t));
-    const double gained = (dt_ * force + pressed.dot(piston.along) - dt_ * piston.damping * tool.speed) /
-                          (piston.mass + dt_ * piston.damping);
-    const double before = std::exchange(tool.speed, std::clamp(tool.speed + gained, -piston.largest, piston.largest));
-    tool.next += (tool.speed - before) * piston.along;
+    const Vec3 pressed(sums[t].last[0], sums[t].last[1], sums[t].last[2]),
+        moment = Vec3(sums[t].last[3], sums[t].last[4], sums[t].last[5]) - tool.place().cross(pressed);
+    if (const Piston& piston = tool.piston; piston.mass > 0) {
+      double force = piston.force.at(time_).x();
+      if (piston.pressure) force *= piston.area > 0 ? piston.area : face_area(static_cast<int>(t));
+      const double speed = tool.speed + gained(piston, tool.speed, force, pressed.dot(piston.along), dt_);
+      const double before = std::exchange(tool.speed, std::clamp(speed, -piston.largest, piston.largest));
+      tool.next += (tool.speed - before) * piston.along;
+    }
+    if (const Piston& rotor = tool.rotor; rotor.mass > 0) {
+      const double change = gained(rotor, tool.turning, rotor.force.at(time_).x(), moment.dot(rotor.along), dt_);
+      tool.turning += change;
+      tool.spin_next += change * rotor.along;
+    }
   }
 }
 
@@ -286,7 +295,7 @@ void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
   template void Simulation<Dim>::turn_stress(Piece<Dim>&);                  \
   template void Simulation<Dim>::move_rigid(Piece<Dim>&);                   \
   template void Simulation<Dim>::begin_tools();                             \
-  template void Simulation<Dim>::push_pistons();                            \
+  template void Simulation<Dim>::push_tools();                              \
   template void Simulation<Dim>::end_tools();                               \
   template void Simulation<Dim>::set_velocities_of_tools();                 \
   template void Simulation<Dim>::aim_walls();                               \

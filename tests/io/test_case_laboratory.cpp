@@ -32,6 +32,7 @@ bodies = { group = "lid" }
 about = [0.5, 0.5]
 velocity = ["0.1 * sin(pi * t)", -0.25]
 angular_velocity = "2 * t"
+rotor = { inertia = 2.0, moment = "0.5 * t", damping = 0.1 }
 servo = { along = [0.0, -1.0], pressure = [[0.0, 0.0], [1.0, 5.0]], area = 0.4, repeat = true }
 [boundary]
 left = { type = "wall", position = 0.05, velocity = [[0.0, 0.1, 0.0], [0.5, 0.0, 0.0]], repeat = true }
@@ -83,6 +84,10 @@ TEST_F(CaseFile, LaboratoriesReadBackToTheSameCase) {
   EXPECT_EQ(last.faces[3].piston.force.at(0).x(), 7);
   EXPECT_GT(last.faces[3].piston.gain, 0) << "a servo takes the place of a piston";
   EXPECT_FALSE(last.drives[0].piston.pressure);
+  EXPECT_EQ(last.drives[0].rotor.mass, 2);
+  EXPECT_EQ(last.drives[0].rotor.damping, 0.1);
+  EXPECT_EQ(last.drives[0].rotor.force.at(0.5).x(), 0.25);
+  EXPECT_EQ(last.drives[0].rotor.along, Vec3(0, 0, 1));
   EXPECT_EQ(last.drives[0].piston.force.at(0.05).x(), 1.5);
   EXPECT_EQ(last.damping.local, 0.5);
   EXPECT_EQ(last.damping.viscous, 3);
@@ -151,6 +156,8 @@ TEST_F(CaseFile, LaboratoriesThatCannotBeAreRefused) {
   refuse("drive.0.velocity", "[\"0.1 *\", 0.0]", "--set drive.0.velocity", "is no formula of t");
   refuse("drive.0.velocity", "[\"ln(t - 1)\", 0.0]", "--set drive.0.velocity", "write one such as");
   refuse("drive.0.servo.gain", "0.0", "--set drive.0.servo.gain", "greater than 0");
+  refuse("drive.0.rotor.inertia", "0.0", "--set drive.0.rotor.inertia", "greater than 0");
+  refuse("drive.0.rotor.axis", "[0.0, 1.0]", "--set drive.0.rotor.axis", "unknown");
   refuse("time.until.packing", "-1.0", "--set time.until.packing", "greater than 0");
   refuse("stage.0.until.of", "\"roof\"", "--set stage.0.until.of", "choose one of left, top, lid");
   refuse("stage.0.set.domain.cells", "[4, 4]", "case.toml", "domain.cells cannot change in a run");

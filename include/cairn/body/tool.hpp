@@ -50,8 +50,13 @@ struct Piston {
   double area = 0;  // [m^(Dim-1)]; 0: of the face between the other faces, where they stand
 };
 
+/// The velocity that a piston gains in dt [m/s], where bodies press it with an impulse along its direction [N s].
+inline double gained(const Piston& piston, double speed, double force, double pressed, double dt) {
+  return (dt * force + pressed - dt * piston.damping * speed) / (piston.mass + dt * piston.damping);
+}
+
 /// Numbers of a tool's state.
-inline constexpr int tool_state_size = 10;
+inline constexpr int tool_state_size = 11;
 
 /// What a tool is, and where it stands.
 struct Tool {
@@ -59,25 +64,29 @@ struct Tool {
   Vec3 centre = Vec3::Zero();  // at the start; of a face its middle [m]
   MotionTable velocity, spin;  // as given [m/s, rad/s]
   Piston piston;
+  Piston rotor;  // the same of a turn about an axis: inertia [kg m2], moment [N m], damping [N m s]
   // State:
-  double speed = 0;                                        // of the piston along its direction [m/s]
+  double speed = 0, turning = 0;                           // of piston and rotor along their directions [m/s, rad/s]
   Vec3 travel = Vec3::Zero();                              // since the start [m]
   Vec3 now = Vec3::Zero(), next = Vec3::Zero();            // velocity at the start and the end of the step [m/s]
   Vec3 spin_now = Vec3::Zero(), spin_next = Vec3::Zero();  // likewise [rad/s]
 
   std::array<double, tool_state_size> state() const {
-    return {travel[0], travel[1], travel[2], now[0], now[1], now[2], spin_now[0], spin_now[1], spin_now[2], speed};
+    return {travel[0],   travel[1],   travel[2],   now[0], now[1], now[2],
+            spin_now[0], spin_now[1], spin_now[2], speed,  turning};
   }
   void restore(const double* s) {
     travel = Vec3(s[0], s[1], s[2]), now = next = Vec3(s[3], s[4], s[5]);
-    spin_now = spin_next = Vec3(s[6], s[7], s[8]), speed = s[9];
+    spin_now = spin_next = Vec3(s[6], s[7], s[8]), speed = s[9], turning = s[10];
   }
 
-  bool moves() const { return piston.mass > 0 || velocity.varies() || spin.varies(); }
+  bool is_pushed() const { return piston.mass > 0 || rotor.mass > 0; }
+  bool turns() const { return rotor.mass > 0 || !spin.is_zero(); }
+  bool moves() const { return is_pushed() || velocity.varies() || spin.varies(); }
   Vec3 place() const { return centre + travel; }
   /// Velocity and spin with which it moves in the step.
   Vec3 of_step() const { return piston.mass > 0 ? next : Vec3(0.5 * (now + next)); }
-  Vec3 spin_of_step() const { return 0.5 * (spin_now + spin_next); }
+  Vec3 spin_of_step() const { return rotor.mass > 0 ? spin_next : Vec3(0.5 * (spin_now + spin_next)); }
 };
 
 }  // namespace cairn

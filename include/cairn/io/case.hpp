@@ -111,6 +111,7 @@ struct Drive {
   MotionTable angular_velocity;  // [rad/s] about each body's centre, or about one point
   std::optional<Vec3> about;     // that point at the start [m]
   Piston piston;
+  Piston rotor;  // Tool::rotor
 };
 
 struct Face {

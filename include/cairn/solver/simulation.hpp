@@ -222,7 +222,7 @@ class Simulation {
 
   // Between the stages: how tools move in the step (tools.cpp).
   void begin_tools();
-  void push_pistons();  // communicates where there are some
+  void push_tools();  // communicates where there are pistons or rotors
   void end_tools();
   void set_velocities_of_tools();
   void keep_what_is_asked(const Case& c);
@@ -355,7 +355,7 @@ class Simulation {
   void turn_stress(Piece<Dim>& piece);
   void move_rigid(Piece<Dim>& piece);
   bool turns_rigidly(const Piece<Dim>& piece) const {
-    return is_rigid(piece) && !tools_[bodies_[piece.body].tool].spin.is_zero();
+    return is_rigid(piece) && tools_[bodies_[piece.body].tool].turns();
   }
   /// Points of rigid bodies that turn always carry spin, so that nodes have exactly the body's motion.
   const TransferSettings<Dim>& transfer_of(const Piece<Dim>& piece) const {
@@ -391,7 +391,7 @@ class Simulation {
   std::vector<Body> bodies_;
   std::vector<Tool> tools_;
   std::vector<int> moved_bodies_;  // of tools whose velocity changes
-  bool has_pistons_ = false;
+  bool pushed_tools_ = false;  // there are pistons or rotors
   Case pouring_;  // of the case, what placing a body asks for, and the bodies that come; elsewhere nothing
   struct Pouring {
     int placed = 0, drawn = 0;
