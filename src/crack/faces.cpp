@@ -18,6 +18,8 @@ double spline(double u) {
   return u < 1.5 ? 0.5 * (1.5 - u) * (1.5 - u) : 0.0;
 }
 
+bool carries(const Bond& bond) { return bond.state == Bond::holds && bond.length > 0; }
+
 /// Mass, momentum and share of a full node of all cut bodies in one row.
 template <int Dim>
 struct RowState {
@@ -337,20 +339,32 @@ void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
 }
 
 template <int Dim>
+void keep_idle_bonds_closed(std::vector<CrackPoint<Dim>>& points) {
+  for (CrackPoint<Dim>& point : points) {
+    if (!point.own || !carries(point.bond) || point.faces_filled == 3) continue;
+    const Vec<Dim> mean = 0.5 * (point.lower_velocity + point.upper_velocity);
+    point.lower_velocity = point.upper_velocity = mean;
+  }
+}
+
+template <int Dim>
 std::vector<RowForce<Dim>> find_row_forces(
     const CrackSurroundings<Dim>& around, double ahead,
     const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>& traction) {
   std::vector<RowForce<Dim>> forces;
   for (const auto& point : around.patch.cracks) {
-    const bool carries = point.bond.state == Bond::holds && point.bond.length > 0 && point.faces_filled == 3;
-    if (!carries || around.cracks[point.crack].is_tip(point.index)) continue;
+    if (!carries(point.bond) || around.cracks[point.crack].is_tip(point.index)) continue;
     std::array<FaceRows<Dim>, 2> rows;
     Vec<Dim> opening = point.opening();
-    bool whole = point.own;  // else a neighbour, which does not know both faces, answers for one
+    bool whole = point.own, filled = true;
     for (const int side : {-1, 1}) {
-      if (answers_for_face(around, point, side)) rows[side > 0] = rows_of_face(around, point, side);
-      whole = whole && rows[side > 0].is_filled();
+      const bool here = answers_for_face(around, point, side);
+      if (here) rows[side > 0] = rows_of_face(around, point, side);
+      whole = whole && here, filled = filled && rows[side > 0].is_filled();
     }
+    // Faces with material on both sides now part in this step, and no others. Of a wide crack one patch does not know
+    // both: as they were.
+    if (whole ? !filled : point.faces_filled != 3) continue;
     for (const int side : {-1, 1})
       for (const auto& at : rows[side > 0].rows)
         if (whole) opening += side * ahead * at.weight * start_velocity<Dim>(around, point.crack, at);
@@ -400,6 +414,7 @@ void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, con
       const CrackSurroundings<Dim>&, double, const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>&); \
   template void sort_row_forces(std::vector<RowForce<Dim>>&);                                                          \
   template void add_row_forces(Patch<Dim>&, const CrackSurroundings<Dim>&, const std::vector<RowForce<Dim>>&);         \
+  template void keep_idle_bonds_closed(std::vector<CrackPoint<Dim>>&);                                                 \
   template void borrow_face_velocities(std::vector<CrackPoint<Dim>>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -55,9 +55,21 @@ TractionLaw::Modes TractionLaw::traction(const Modes& d, const Bond& bond) const
 
 void TractionLaw::follow(const Modes& d, Bond& bond) const {
   if (!cohesive_ || bond.state != Bond::holds) return;
-  const Modes now = seen(d);
-  for (int m = 0; m < 2; ++m) bond.peak[m] = std::max(bond.peak[m], std::min(now[m], critical_of(modes_[m])));
-  if (!breaks(bond)) return;
+  const Modes now = seen(d), before = bond.peak;
+  Modes after;
+  for (int m = 0; m < 2; ++m) after[m] = std::max(before[m], std::min(now[m], critical_of(modes_[m])));
+  const auto breaks_at = [&](double share) {
+    for (int m = 0; m < 2; ++m) bond.peak[m] = std::lerp(before[m], after[m], share);
+    return breaks(bond);
+  };
+  if (!breaks_at(1)) return;
+  // On the way there: beyond that point it takes nothing.
+  double holds = 0, broken = 1;
+  for (int halving = 0; exponent_ > 0 && halving < 50; ++halving) {
+    const double middle = 0.5 * (holds + broken);
+    (breaks_at(middle) ? broken : holds) = middle;
+  }
+  breaks_at(broken);
   Modes last;
   for (int m = 0; m < 2; ++m) last[m] = std::min(now[m], bond.peak[m]);
   bond.dissipated = dissipated_unbroken(bond) + stored(last, bond);

@@ -32,7 +32,7 @@ void read_cohesive(Table table, CohesiveSpec& law) {
   if (table.has("peak") && law.shape != CohesiveShape::triangle)
     table.error("peak", "is only for shape = \"triangle\"");
   law.peak = table.number("peak", law.peak, share);
-  law.exponent = table.has("exponent") ? table.number("exponent", std::nullopt, positive) : 0.0;
+  law.exponent = table.number("exponent", law.exponent, not_negative);
   law.range[0] = table.number("from", 0.0, not_negative);
   law.range[1] = table.number("to", infinity, {0, infinity, true, false, true});
   if (law.range[0] >= law.range[1]) table.error("to", "must be larger than `from`");

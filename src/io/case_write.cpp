@@ -346,8 +346,8 @@ void write_crack_law(Writer& out, const CrackSpec& crack) {
         fmt::format("{{ shape = \"{}\", strength = {}, energy = {}", name_of(cohesive_shape_names, law.shape),
                     list_of(law.strength, 2), list_of(law.energy, 2));
     if (law.shape == CohesiveShape::triangle) text += ", peak = " + text_of(law.peak);
-    if (law.exponent > 0) text += ", exponent = " + text_of(law.exponent);
-    out.raw("cohesive", text + fmt::format(", from = {}, to = {} }}", text_of(law.range[0]), text_of(law.range[1])));
+    out.raw("cohesive", text + fmt::format(", exponent = {}, from = {}, to = {} }}", text_of(law.exponent),
+                                           text_of(law.range[0]), text_of(law.range[1])));
   }
   if (crack.growth.criterion != GrowthCriterion::none) write_growth(out, crack.growth);
 }

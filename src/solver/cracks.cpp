@@ -169,6 +169,7 @@ void Simulation<Dim>::move_cracks() {
   exchange_face_velocities(*messages_, table_, patches_, lattice_, face_motions_);
   for (auto& patch : patches_) {
     borrow_face_velocities(patch.cracks);
+    keep_idle_bonds_closed(patch.cracks);
     for (auto& point : patch.cracks)
       if (point.own) point.move(dt_);
   }

@@ -153,7 +153,8 @@ Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from
       transfer_.mirrored[d][side] = type == FaceType::symmetry, transfer_.walled[d][side] = type == FaceType::wall;
     }
   const bool walls = std::ranges::any_of(contact_.faces, [](const auto& f) { return f.type == FaceType::wall; });
-  transfer_.normals_needed = walls || (bodies_.size() > 1 && transfer_.normals_needed);  // something to touch
+  const bool several = bodies_.size() > 1 || c.crack.split > 0;
+  transfer_.normals_needed = walls || (several && transfer_.normals_needed);  // something to touch
   if (solver_.shape == ShapeFunction::cpdi)
     for (std::size_t b = 0; b < bodies_.size(); ++b)
       transfer_.stretch.push_back(

@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "cairn/core/error.hpp"
 #include "cairn/solver/simulation.hpp"
@@ -122,6 +123,14 @@ std::vector<SideSet> united_sides(const Patch<Dim>& patch, const Piece<Dim>& pie
   return sides;
 }
 
+/// Walls are counted behind all bodies: contacts with them, where a body comes in front.
+template <int Dim>
+void renumber_walls(Patch<Dim>& patch, int body) {
+  const auto before = std::exchange(patch.contacts, {});
+  for (const auto& [pair, sum] : before)
+    patch.contacts.emplace(std::pair(pair.first, pair.second + (pair.second >= body)), sum);
+}
+
 /// What a run's labels come to when those that share a row in different patches are one.
 std::map<std::int64_t, std::int64_t> join(const std::vector<std::int64_t>& rows,
                                           std::map<std::int64_t, std::int64_t>& body_of) {
@@ -215,12 +224,17 @@ void Simulation<Dim>::split_bodies() {
   tell_contact_of_cracks();
 }
 
+/// One more body, a part of another: whatever is kept for each body gets its own.
 template <int Dim>
 int Simulation<Dim>::add_part(int of) {
   const auto part = static_cast<int>(bodies_.size());
   parts_.push_back(of);
   bodies_.push_back(Body(bodies_[of]));
-  crack_densities_.push_back(crack_densities_[of]);
+  crack_densities_.push_back(double{crack_densities_[of]});
+  for (auto* transfer : {&transfer_, &transfer_of_turning_})
+    if (!transfer->stretch.empty()) transfer->stretch.push_back(transfer->stretch_of(of));
+  for (auto& patch : patches_) renumber_walls(patch, part);
+  contact_.bodies = part + 1;
   for (Crack& crack : cracks_) {
     if (std::ranges::find(crack.bodies, of) != crack.bodies.end()) crack.bodies.push_back(part);
     if (std::ranges::find(crack.spared, of) != crack.spared.end()) crack.spared.push_back(part);

@@ -120,18 +120,26 @@ std::array<double, 2> Simulation<Dim>::energies_of(const CrackPoint<Dim>& point)
   return {point.bond.length * stored, point.bond.length * law.dissipated(point.bond)};
 }
 
+/// The tractions of a step are the mean over the way that the opening is about to go: what they take is then what the
+/// law takes, also where its curve bends or ends.
 template <int Dim>
 void Simulation<Dim>::find_tractions(std::size_t p) {
   if (traction_laws_.empty()) return;
+  constexpr int parts = 8;
+  const double share = solver_.stress_update == StressUpdate::both ? 0.5 : 1.0;
   const auto traction = [&](const CrackPoint<Dim>& point, const Vec<Dim>& ahead) -> Vec<Dim> {
     const TractionLaw& law = *traction_laws_[point.crack];
-    const Opening<Dim> opening(segments_[p], point, ahead);
+    const Vec<Dim> way = (ahead - point.opening()) / share;
     Bond bond = point.bond;  // what it will be then; its history follows the openings at the ends of steps
-    law.follow(opening.d, bond);
-    const auto T = law.traction(opening.d, bond);
-    return T[0] * opening.normal + T[1] * opening.along;
+    Vec<Dim> sum = Vec<Dim>::Zero();
+    for (int part = 0; part < parts; ++part) {
+      const Opening<Dim> opening(segments_[p], point, ahead + ((part + 0.5) / parts - 0.5) * way);
+      law.follow(opening.d, bond);
+      const auto T = law.traction(opening.d, bond);
+      sum += T[0] * opening.normal + T[1] * opening.along;
+    }
+    return sum / parts;
   };
-  const double share = solver_.stress_update == StressUpdate::both ? 0.5 : 1.0;
   row_forces_[p] = find_row_forces<Dim>(surroundings_of(patches_[p]), share * dt_, traction);
 }
 

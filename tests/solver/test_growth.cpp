@@ -7,6 +7,7 @@
 
 #include "../support/crack_cases.hpp"
 #include "../support/mpi_environment.hpp"
+#include "cairn/solver/body_states.hpp"
 
 namespace cairn {
 namespace {
@@ -103,8 +104,10 @@ std::set<int> bodies_of(const Simulation<2>& simulation) {
 }
 
 /// A disk cut in three becomes three bodies, which then meet as bodies do.
-TEST(Split, PartsBecomeBodies) {
+void check_parts(ShapeFunction shape) {
+  SCOPED_TRACE(static_cast<int>(shape));
   Case c = soft_case(2, 30, 10);
+  c.solver.shape = shape;
   add_body(c, Ball{Vec3(0.5, 0.5, 0), 0.3});
   add_crack(c, {Vec3(0.15, 0.403, 0), Vec3(0.85, 0.403, 0)}, CrackLaw::friction);
   add_crack(c, {Vec3(0.15, 0.597, 0), Vec3(0.85, 0.597, 0)}, CrackLaw::friction);
@@ -116,6 +119,9 @@ TEST(Split, PartsBecomeBodies) {
   const auto start = points_of(simulation);
   for (int i = 0; i < 25; ++i) simulation.step(1e300);
   EXPECT_EQ(bodies_of(simulation).size(), 3u);
+  if (shape == ShapeFunction::cpdi) {
+    EXPECT_EQ(simulation.transfer().stretch, std::vector<double>(3, 1.0));
+  }
   std::map<int, std::set<int>> bodies;
   for (const auto& [id, p] : points_of(simulation)) {
     bodies[part_of(start.at(id).x)].insert(p.body);
@@ -135,6 +141,34 @@ TEST(Split, PartsBecomeBodies) {
   EXPECT_LE((after.momentum - before.momentum).norm(), 1e-13 * before.mass);
   EXPECT_NEAR(after.energy(), before.energy(), 0.01 * before.kinetic);
   EXPECT_GT(after.contact_nodes + after.contact_dissipation, 0) << "the parts did not meet";
+}
+TEST(Split, PartsBecomeBodies) {
+  // Linear hats have normals of other weights, which nothing needs where one body is alone; CPDI, one size for each.
+  for (const auto shape : {ShapeFunction::gimp, ShapeFunction::linear, ShapeFunction::cpdi}) check_parts(shape);
+}
+
+/// Walls are numbered behind the bodies, however many these are.
+TEST(Split, WallsKeepTheirContacts) {
+  Case c = soft_case(2, 20, 5);
+  add_body(c, BoxShape{Vec3(0.3, 0.001, 0), Vec3(0.7, 0.6, 0)});
+  add_crack(c, {Vec3(0.2, 0.313, 0), Vec3(0.8, 0.313, 0)}, CrackLaw::frictionless);
+  c.faces[2].type = FaceType::wall;
+  c.output.contacts.every = 1;
+  c.crack.split = 20;
+  Simulation<2> simulation(c, MPI_COMM_SELF);
+  set_velocities(simulation, [](const Vec<2>& x) { return Vec<2>(0, x.y() > 0.313 ? 0.5 : -0.5); });
+  double before = 0;
+  for (int i = 0; i < 21; ++i) {
+    if (i == 20) before = contact_states(simulation, 1.0).at(0).force.norm();
+    simulation.step(1e300);
+  }
+  ASSERT_EQ(bodies_of(simulation).size(), 2u);
+  const auto contacts = contact_states(simulation, 1.0);
+  ASSERT_EQ(contacts.size(), 1u) << "of the lower part and the bottom";
+  EXPECT_EQ(contacts[0].body_a, 0);
+  EXPECT_EQ(contacts[0].body_b, -3);
+  EXPECT_GT(before, 0);
+  EXPECT_GT(contacts[0].force.norm(), before);
 }
 
 /// What is bound stays one body: by its law, by crack points that hold, or ahead of a tip.

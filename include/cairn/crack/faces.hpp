@@ -90,4 +90,9 @@ void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, con
 template <int Dim>
 void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points);
 
+/// Where a face has no material, nothing takes the traction of a law that holds: the faces of such points do not part,
+/// or the law would store energy that nothing gave.
+template <int Dim>
+void keep_idle_bonds_closed(std::vector<CrackPoint<Dim>>& points);
+
 }  // namespace cairn
