@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import matplotlib.pyplot as plt
 import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import figures
 from results import Frame, MissingData, Run, reading
@@ -14,9 +15,7 @@ from results import Frame, MissingData, Run, reading
 
 def faces(run: Run, frame: Frame) -> list[tuple[np.ndarray, np.ndarray]]:
     """Lower and upper face (each N x 2) [m] of every crack at the time of a frame, cut where it leaves the domain."""
-    path = frame.path.parent / f"{frame.path.stem.replace('particles', 'cracks')}.h5"
-    if not path.exists():
-        raise MissingData(f"there is no {path.name}: the case has no cracks")
+    path = beside(frame, "cracks")
     with reading(path), h5py.File(path, "r") as file:
         crack, index, image = file["crack"][()], file["index"][()], file["image"][()]
         lower, upper = file["lower"][()][:, :2], file["upper"][()][:, :2]
@@ -40,12 +39,12 @@ def draw_faces(axes, run: Run, frame: Frame) -> None:
 
 
 def cracks(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
-    """The faces of the cracks over the bodies, at the start and at the end."""
-    if run.dimension != 2:
-        raise MissingData("drawn for two dimensions only")
+    """The faces of the cracks over the bodies, at the start and at the end; in 3D their surfaces and opening."""
     if not run.frames:
         raise MissingData("there are no particles_*.vtkhdf files (see output.particles)")
     frames = [run.frames[0], run.frames[-1]]
+    if run.dimension == 3:
+        return surfaces(run, frames, folder)
     figure, row = plt.subplots(1, 2, figsize=(14, 7))
     for axes, frame in zip(row, frames):
         faces(run, frame)
@@ -53,6 +52,40 @@ def cracks(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str
         draw_faces(axes, run, frame)
         for d, limits in enumerate((axes.set_xlim, axes.set_ylim)):
             limits(figures.length_unit(run)[0] * run.lower[d], figures.length_unit(run)[0] * run.upper[d])
+    return [figures._save(figure, folder, "cracks.png")]
+
+
+def beside(frame: Frame, kind: str) -> Path:
+    """The file of cracks or tips that belongs to a frame."""
+    path = frame.path.parent / f"{frame.path.stem.replace('particles', kind)}.h5"
+    if not path.exists():
+        raise MissingData(f"there is no {path.name}: the case has no cracks")
+    return path
+
+
+def surfaces(run: Run, frames: list[Frame], folder: Path) -> list[str]:
+    """Triangles of 3D cracks, coloured by the size of the opening at the end [m]."""
+    factor, unit = figures.length_unit(run)
+    figure = plt.figure(figsize=(14, 7))
+    data = []
+    for frame in frames:
+        path = beside(frame, "cracks")
+        with reading(path), h5py.File(path, "r") as file:
+            corners = file["VTKHDF/Connectivity"][()].reshape(-1, 3)
+            data.append((frame, file["position"][()], corners, np.linalg.norm(file["opening"][()], axis=1)))
+    most = max(opening.max(initial=0) for *_, opening in data) or 1.0
+    for place, (frame, position, corners, opening) in enumerate(data, 1):
+        axes = figure.add_subplot(1, 2, place, projection="3d")
+        patches = Poly3DCollection(factor * position[corners], edgecolor=(0, 0, 0, 0.3), linewidth=0.3)
+        patches.set_array(opening[corners].mean(axis=1))
+        patches.set_clim(0, most)
+        axes.add_collection3d(patches)
+        for limits, low, high in zip((axes.set_xlim, axes.set_ylim, axes.set_zlim), run.lower, run.upper):
+            limits(factor * low, factor * high)
+        axes.set_box_aspect(run.upper - run.lower)
+        axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", zlabel=f"z [{unit}]")
+        axes.set_title(f"{run.title}, {figures.label(run, frame)}", fontsize=10)
+        figure.colorbar(patches, ax=axes, shrink=0.6, label="opening [m]")
     return [figures._save(figure, folder, "cracks.png")]
 
 
@@ -67,6 +100,8 @@ def tips(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
     if rows.size == 0:
         raise MissingData("tips.csv has no rows")
     table = dict(zip(names, rows.T))
+    if "index" in table:
+        table["end"] = table["index"]  # points of a rim
     panels = (("J", "J [J/m²]"), ("K_I", "K_I [Pa m$^{1/2}$]"), ("K_II", "K_II [Pa m$^{1/2}$]"),
               ("grown", "growth [m]"))
     figure, axes = plt.subplots(2, 2, figsize=(11, 8), sharex=True)
@@ -75,7 +110,7 @@ def tips(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
         for crack, end in tips_of_run:
             rows_of_tip = (table["crack"] == crack) & (table["end"] == end)
             panel.plot(table["time"][rows_of_tip], table[name][rows_of_tip], lw=1,
-                       label=f"crack {crack:.0f}, {'last' if end else 'first'} end")
+                       label=f"crack {crack:.0f}, " + (f"point {end:.0f}" if run.dimension == 3 else f"{'last' if end else 'first'} end"))
         panel.set_ylabel(title)
     for panel in axes[1]:
         panel.set_xlabel("time [s]")

@@ -29,7 +29,7 @@ PICTURES = """pictures:
   stress_strain.png, coordination.png, force_distribution.png, fabric_rose.png, profiles.png
                             measures of grains and contacts (docs/measures.md)
   outflow.png               mass that left through free faces
-  cracks.png                faces of cracks over the bodies (2D)
+  cracks.png                faces of cracks over the bodies; in 3D their surfaces and opening
   tips.png                  J, K and growth of their tips (output.tips)
   film.mp4 or film.gif      with --film
   photoelastic.png          with --fringes PA: dark fringes of equal shear stress (2D), and nothing else is drawn

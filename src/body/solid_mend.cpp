@@ -204,14 +204,31 @@ void turn_parts(Triangles& t, const std::vector<std::int32_t>& part, SurfaceFaul
 
 }  // namespace
 
-SurfaceFaults mend(Triangles& surface) {
-  SurfaceFaults faults;
+namespace {
+
+/// Returns the part of each triangle.
+std::vector<std::int32_t> join_up(Triangles& surface, SurfaceFaults& faults) {
   merge_points(surface);
   drop_useless(surface, faults);
-  if (surface.corners.empty()) return faults;
+  if (surface.corners.empty()) return {};
   const std::vector<Side> sides = sides_of(surface);
   find_holes(surface, sides, faults);
-  turn_parts(surface, agree(surface, sides, faults), faults);
+  return agree(surface, sides, faults);
+}
+
+}  // namespace
+
+SurfaceFaults mend_sheet(Triangles& surface) {
+  SurfaceFaults faults;
+  join_up(surface, faults);
+  return faults;
+}
+
+SurfaceFaults mend(Triangles& surface) {
+  SurfaceFaults faults;
+  const auto parts = join_up(surface, faults);
+  if (surface.corners.empty()) return faults;
+  turn_parts(surface, parts, faults);
   faults.crossings = count_crossings(surface, faults.crossing_at);
   return faults;
 }

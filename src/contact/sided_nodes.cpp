@@ -146,7 +146,15 @@ bool ContactSweep<Dim>::crosses_cracks(const Node& node) const {
 /// Pairs across cracks may close circles, along which impulses are not unique: the least ones.
 template <int Dim>
 void ContactSweep<Dim>::solve_for_least() {
-  const Eigen::MatrixXd whole = matrix_.template selfadjointView<Eigen::Lower>();
+  Eigen::MatrixXd whole = matrix_.template selfadjointView<Eigen::Lower>();
+  if constexpr (Dim == 3) {
+    // Where three planes cross fields may be lighter than others by any factor: with pairs of one size none of them is
+    // taken for round-off of another.
+    const Eigen::VectorXd size = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    whole = (size.asDiagonal() * whole * size.asDiagonal()).eval();
+    right_ = size.asDiagonal() * whole.completeOrthogonalDecomposition().solve(size.asDiagonal() * right_).eval();
+    return;
+  }
   right_ = whole.completeOrthogonalDecomposition().solve(right_).eval();
 }
 

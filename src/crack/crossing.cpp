@@ -2,61 +2,16 @@
 
 #include "cairn/crack/crossing.hpp"
 
-#include <cmath>
+#include "exact_sum.hpp"
 
 namespace cairn::crack {
-namespace {
-
-/// A sum without rounding errors: components that do not overlap, ascending in size (Shewchuk, Discrete Comput. Geom.
-/// 18, 1997, GROW-EXPANSION).
-class Expansion {
- public:
-  void add(double b) {
-    for (int i = 0; i < size_; ++i) {
-      const double sum = b + terms_[i], virtual_b = sum - terms_[i], virtual_a = sum - virtual_b;
-      terms_[i] = (terms_[i] - virtual_a) + (b - virtual_b);
-      b = sum;
-    }
-    terms_[size_++] = b;
-  }
-  void add_product(double a, double b, double sign) {
-    const double product = a * b;
-    add(sign * std::fma(a, b, -product));
-    add(sign * product);
-  }
-  int sign() const {
-    for (int i = size_ - 1; i >= 0; --i)
-      if (terms_[i] != 0) return terms_[i] > 0 ? 1 : -1;
-    return 0;
-  }
-
- private:
-  double terms_[12];
-  int size_ = 0;
-};
-
-int sign_of(double a) { return (a > 0) - (a < 0); }
-
-/// The first of them that is not 0, as a sign.
-template <class... Rest>
-int first_sign(int first, Rest... rest) {
-  if constexpr (sizeof...(rest) > 0)
-    return first != 0 ? first : first_sign(rest...);
-  else
-    return first;
-}
-
-/// The sign of a - b, which rounding keeps.
-int difference(double a, double b) { return (a > b) - (a < b); }
-
-}  // namespace
 
 int orientation(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c) {
   const double left = (a.x() - c.x()) * (b.y() - c.y()), right = (a.y() - c.y()) * (b.x() - c.x());
   const double det = left - right;
   constexpr double bound = 4.44089209850062616169452667236328125e-16;  // Shewchuk's (3 + 16 u) u, rounded up
   if (std::abs(det) > bound * (std::abs(left) + std::abs(right))) return sign_of(det);
-  Expansion exact;
+  ExactSum<12> exact;
   exact.add_product(a.x(), b.y(), 1), exact.add_product(a.y(), b.x(), -1);
   exact.add_product(b.x(), c.y(), 1), exact.add_product(b.y(), c.x(), -1);
   exact.add_product(c.x(), a.y(), 1), exact.add_product(c.y(), a.x(), -1);

@@ -162,7 +162,7 @@ template <int Dim>
 FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, int side) {
   FaceRows<Dim> face;
   const int body = cut_body(around, point.crack);
-  const Vec<Dim> normal = around.segments.normal_near(point.crack, point.plane);
+  const Vec<Dim> normal = around.segments.normal_at(point);
   if (body < 0 || !(normal.squaredNorm() > 0)) return face;
   const Lattice<Dim>& lattice = around.lattice;
   const Vec<Dim> x = side > 0 ? point.upper : point.lower;
@@ -252,7 +252,7 @@ Faces<Dim> velocities_of_faces(const CrackSurroundings<Dim>& around, CrackPoint<
   point.faces_filled = 0;
   if (crack.idle) faces[0] = faces[1] = Vec<Dim>::Zero();
   if (crack.idle) return faces;
-  if (crack.is_tip(point.index)) {
+  if (is_tip(crack, point)) {
     faces[0] = faces[1] = common_velocity(around, point.crack, point.plane);
     return faces;
   }
@@ -319,6 +319,23 @@ std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& 
   return told;
 }
 
+namespace {
+
+/// The crack point with material beside it that is nearest to the k-th, of those of the same crack; k where there is
+/// none.
+std::ptrdiff_t nearest_filled(const std::vector<CrackPoint<3>>& points, std::ptrdiff_t k) {
+  std::ptrdiff_t nearest = k;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::ptrdiff_t j = 0; j < std::ssize(points); ++j) {
+    const double squared = (points[j].plane - points[k].plane).squaredNorm();
+    if (points[j].crack != points[k].crack || points[j].image != points[k].image || !points[j].filled) continue;
+    if (squared < least) least = squared, nearest = j;
+  }
+  return nearest;
+}
+
+}  // namespace
+
 template <int Dim>
 void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
   const auto n = static_cast<std::ptrdiff_t>(points.size());
@@ -328,6 +345,7 @@ void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
       return j >= 0 && j < n && points[j].crack == points[k].crack && points[j].image == points[k].image;
     };
     const auto nearest = [&]() -> std::ptrdiff_t {
+      if constexpr (Dim == 3) return nearest_filled(points, k);
       for (std::ptrdiff_t away = 1; on_line(k - away) || on_line(k + away); ++away)
         for (const std::ptrdiff_t j : {k - away, k + away})
           if (on_line(j) && points[j].filled) return j;
@@ -353,7 +371,7 @@ std::vector<RowForce<Dim>> find_row_forces(
     const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>& traction) {
   std::vector<RowForce<Dim>> forces;
   for (const auto& point : around.patch.cracks) {
-    if (!carries(point.bond) || around.cracks[point.crack].is_tip(point.index)) continue;
+    if (!carries(point.bond) || is_tip(around.cracks[point.crack], point)) continue;
     std::array<FaceRows<Dim>, 2> rows;
     Vec<Dim> opening = point.opening();
     bool whole = point.own, filled = true;

@@ -1,21 +1,51 @@
 #include "cairn/crack/j_integral.hpp"
 
+#include <Eigen/Dense>
 #include <cmath>
 
 namespace cairn {
 namespace {
 
+template <int Dim>
 struct Weight {
   double q = 0;
-  Vec<2> gradient = Vec<2>::Zero();
+  Vec<Dim> gradient = Vec<Dim>::Zero();
 };
 
-Weight weight_at(const Vec<2>& x, double inner, double outer) {
+Weight<2> radial_weight(const Vec<2>& x, double inner, double outer) {
   const double r = x.norm();
   if (r >= outer) return {};
   if (r <= inner) return {1, Vec<2>::Zero()};
   const double phase = M_PI * (r - inner) / (outer - inner);
   return {0.5 * (1 + std::cos(phase)), -0.5 * M_PI / (outer - inner) * std::sin(phase) / r * x};
+}
+
+/// \param x  in the tip's axes
+template <int Dim>
+Weight<Dim> weight_at(const Vec<Dim>& x, double hat, double inner, double outer) {
+  if constexpr (Dim == 2) {
+    return radial_weight(x, inner, outer);
+  } else {
+    const auto radial = radial_weight(x.template head<2>(), inner, outer);
+    const double along = 1 - std::abs(x.z()) / hat;
+    if (!(along > 0) || !(radial.q > 0)) return {};
+    Weight<3> w;
+    w.q = along * radial.q;
+    w.gradient << along * radial.gradient, (x.z() > 0 ? -1 : 1) * radial.q / hat;
+    return w;
+  }
+}
+
+/// The tip's axes as rows.
+template <int Dim>
+Eigen::Matrix<double, Dim, Dim> axes_of(const CrackTip<Dim>& tip) {
+  Eigen::Matrix<double, Dim, Dim> axes;
+  axes.row(0) = tip.ahead.transpose();
+  if constexpr (Dim == 2)
+    axes.row(1) << -tip.ahead.y(), tip.ahead.x();
+  else
+    axes.row(1) = tip.normal.transpose(), axes.row(2) = tip.ahead.cross(tip.normal).transpose();
+  return axes;
 }
 
 }  // namespace
@@ -44,44 +74,77 @@ UnitField unit_field(int mode, const Vec<2>& x, double shear_modulus, double kap
   return f;
 }
 
-TipSums tip_terms(const CrackTip& tip, const TipPoint& point, double inner, double outer) {
+UnitField3D unit_field_3d(int mode, const Vec<2>& x, double shear_modulus, double kappa) {
+  UnitField3D f{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
+  if (mode < 2) {
+    const UnitField plane = unit_field(mode, x, shear_modulus, kappa);
+    f.H.topLeftCorner<2, 2>() = plane.H, f.stress.topLeftCorner<2, 2>() = plane.stress;
+    f.stress(2, 2) = 0.25 * (3 - kappa) * plane.stress.trace();  // nu of plane strain
+    return f;
+  }
+  // u_3 = 2/mu sqrt(r/2 pi) sin(angle/2)
+  const double r = x.norm(), half = 0.5 * std::atan2(x.y(), x.x()), scale = 1 / std::sqrt(2 * M_PI * r);
+  const Vec<2> pull = scale * Vec<2>(-std::sin(half), std::cos(half));
+  f.stress.block<1, 2>(2, 0) = pull.transpose(), f.stress.block<2, 1>(0, 2) = pull;
+  f.H.block<1, 2>(2, 0) = pull.transpose() / shear_modulus;
+  return f;
+}
+
+template <int Dim>
+double tip_weight(const CrackTip<Dim>& tip, const Vec<Dim>& x, double inner, double outer) {
+  return weight_at<Dim>(axes_of(tip) * (x - tip.position), tip.hat, inner, outer).q;
+}
+
+template <int Dim>
+TipSums tip_terms(const CrackTip<Dim>& tip, const TipPoint<Dim>& point, double inner, double outer) {
+  using Matrix = Eigen::Matrix<double, Dim, Dim>;
   TipSums sums;
-  Eigen::Matrix2d axes;  // rows: the tip's axes
-  axes.row(0) = tip.ahead.transpose(), axes.row(1) << -tip.ahead.y(), tip.ahead.x();
-  const auto turned = [&](const Eigen::Matrix2d& a) -> Eigen::Matrix2d { return axes * a * axes.transpose(); };
-  const Vec<2> x = axes * (point.position - tip.position);
-  const Weight w = weight_at(x, inner, outer);
+  const Matrix axes = axes_of(tip);
+  const auto turned = [&](const Matrix& a) -> Matrix { return axes * a * axes.transpose(); };
+  const Vec<Dim> x = axes * (point.position - tip.position);
+  const Weight<Dim> w = weight_at<Dim>(x, tip.hat, inner, outer);
   if (!(w.q > 0)) return sums;
-  const Eigen::Matrix2d stress = turned(point.stress), H = turned(point.H), L = turned(point.L);
-  const Vec<2> v = axes * point.velocity, a = axes * point.acceleration;
+  const Matrix stress = turned(point.stress), H = turned(point.H), L = turned(point.L);
+  const Vec<Dim> v = axes * point.velocity, a = axes * point.acceleration;
   const double mass = point.density * point.volume;
-  const Vec<2> pull = stress * w.gradient;
+  const Vec<Dim> pull = stress * w.gradient;
   sums.J_static = point.volume * (pull.dot(H.col(0)) - point.energy * w.gradient.x());
   sums.J =
       sums.J_static - 0.5 * mass * v.squaredNorm() * w.gradient.x() + mass * w.q * (a.dot(H.col(0)) - v.dot(L.col(0)));
-  if (tip.modulus == 0 || !(x.squaredNorm() > 0)) return sums;
-  for (const int mode : {0, 1}) {
-    const UnitField unit = unit_field(mode, x, tip.shear_modulus, tip.kappa);
-    const Vec<2> unit_pull = unit.stress * w.gradient;
-    (mode == 0 ? sums.I_opening : sums.I_sliding) =
-        point.volume *
-            (pull.dot(unit.H.col(0)) + unit_pull.dot(H.col(0)) - unit.stress.cwiseProduct(H).sum() * w.gradient.x()) +
-        mass * w.q * a.dot(unit.H.col(0));
+  if (tip.modulus == 0 || !(x.template head<2>().squaredNorm() > 0)) return sums;
+  const auto interaction = [&](const auto& unit) {
+    const Vec<Dim> unit_pull = unit.stress * w.gradient;
+    return point.volume * (pull.dot(unit.H.col(0)) + unit_pull.dot(H.col(0)) -
+                           unit.stress.cwiseProduct(H).sum() * w.gradient.x()) +
+           mass * w.q * a.dot(unit.H.col(0));
+  };
+  if constexpr (Dim == 2) {
+    sums.I_opening = interaction(unit_field(0, x, tip.shear_modulus, tip.kappa));
+    sums.I_sliding = interaction(unit_field(1, x, tip.shear_modulus, tip.kappa));
+  } else {
+    double* const modes[] = {&sums.I_opening, &sums.I_sliding, &sums.I_tearing};
+    for (int mode = 0; mode < 3; ++mode)
+      *modes[mode] = interaction(unit_field_3d(mode, x.template head<2>(), tip.shear_modulus, tip.kappa));
   }
   return sums;
 }
 
-TipSums face_terms(const CrackTip& tip, const Vec<2>& x, const Vec<2>& force, double width, double inner,
+template <int Dim>
+TipSums face_terms(const CrackTip<Dim>& tip, const Vec<Dim>& x, const Vec<Dim>& force, double width, double inner,
                    double outer) {
   TipSums sums;
-  const Vec<2> away = x - tip.position, normal(-tip.ahead.y(), tip.ahead.x());
+  const auto axes = axes_of(tip);
+  const Vec<Dim> away = x - tip.position, normal = axes.row(1).transpose();
   const double behind = -away.dot(tip.ahead);
   const double from = std::max(0.0, behind - 0.5 * width), to = behind + 0.5 * width;
   if (!(to > 0) || tip.modulus == 0 || std::abs(away.dot(normal)) > outer) return sums;
-  const double q = weight_at(Vec<2>(behind, 0), inner, outer).q;
+  Vec<Dim> there = Vec<Dim>::Unit(0) * behind;  // beside the node, in the plane of the crack
+  if constexpr (Dim == 3) there[2] = axes.row(2).dot(away);
+  const double q = weight_at<Dim>(there, tip.hat, inner, outer).q;
   // The mean of 1/sqrt(2 pi r) over the width.
   const double unit = q * 4 / tip.modulus * 2 * (std::sqrt(to) - std::sqrt(from)) / (width * std::sqrt(2 * M_PI));
   sums.I_opening = unit * force.dot(normal), sums.I_sliding = unit * force.dot(tip.ahead);
+  if constexpr (Dim == 3) sums.I_tearing = unit * tip.modulus / (2 * tip.shear_modulus) * axes.row(2).dot(force);
   return sums;
 }
 
@@ -94,5 +157,13 @@ HoopStress largest_hoop_stress(double K_opening, double K_sliding) {
   const double c = std::cos(angle / 2);
   return {angle, c * (K_opening * c * c - 1.5 * K_sliding * std::sin(angle))};
 }
+
+#define CAIRN_INSTANTIATE(Dim)                                                                                 \
+  template double tip_weight(const CrackTip<Dim>&, const Vec<Dim>&, double, double);                           \
+  template TipSums face_terms(const CrackTip<Dim>&, const Vec<Dim>&, const Vec<Dim>&, double, double, double); \
+  template TipSums tip_terms(const CrackTip<Dim>&, const TipPoint<Dim>&, double, double);
+CAIRN_INSTANTIATE(2)
+CAIRN_INSTANTIATE(3)
+#undef CAIRN_INSTANTIATE
 
 }  // namespace cairn

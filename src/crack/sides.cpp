@@ -1,11 +1,13 @@
 #include "cairn/crack/sides.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <map>
 
 #include "cairn/core/lanes.hpp"
 #include "cairn/crack/crossing.hpp"
+#include "sheets.hpp"
 
 namespace cairn {
 namespace {
@@ -20,11 +22,29 @@ double spline(double u) {
   return u < 1.5 ? 0.5 * (1.5 - u) * (1.5 - u) : 0.0;
 }
 
-/// Whether the boxes around two lines do not even touch.
-bool are_apart(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c, const Vec<2>& d) {
-  for (int k = 0; k < 2; ++k)
-    if (std::max(a[k], b[k]) < std::min(c[k], d[k]) || std::max(c[k], d[k]) < std::min(a[k], b[k])) return true;
+/// Bounds of a segment or triangle in one direction.
+template <int Dim>
+std::pair<double, double> extent(const std::array<Vec<Dim>, Dim>& corners, int k) {
+  double lower = corners[0][k], upper = corners[0][k];
+  for (int i = 1; i < Dim; ++i) lower = std::min(lower, corners[i][k]), upper = std::max(upper, corners[i][k]);
+  return {lower, upper};
+}
+
+/// Whether the boxes around a line and a segment or triangle do not even touch.
+template <int Dim>
+bool are_apart(const Vec<Dim>& a, const Vec<Dim>& b, const std::array<Vec<Dim>, Dim>& corners) {
+  for (int k = 0; k < Dim; ++k) {
+    const auto [lower, upper] = extent<Dim>(corners, k);
+    if (std::max(a[k], b[k]) < lower || upper < std::min(a[k], b[k])) return true;
+  }
   return false;
+}
+
+/// Whether both ends of a line lie on one side of a triangle's plane, beyond doubt: rounding errors are far smaller.
+bool on_one_side(const Vec<3>& x, const Vec<3>& node, const Vec<3>& corner, const Vec<3>& normal) {
+  const double from = normal.dot(x - corner), to = normal.dot(node - corner);
+  const double sure = 1e-6 * (node - x).cwiseAbs().maxCoeff();
+  return (from > sure && to > sure) || (from < -sure && to < -sure);
 }
 
 /// What the line from a point to a node crosses, by point.
@@ -43,7 +63,7 @@ CrackSegments<Dim>::CrackSegments(const Patch<Dim>& patch, const Lattice<Dim>& l
   if constexpr (Dim == 2) {
     const auto add = [&](int crack, const Vec<2>& a, const Vec<2>& b) {
       const Vec<2> e = (b - a).normalized();
-      if (e.squaredNorm() > 0) segments_.push_back({crack, a, b, Vec<2>(-e.y(), e.x())});
+      if (e.squaredNorm() > 0) segments_.push_back({crack, {a, b}, Vec<2>(-e.y(), e.x())});
     };
     const auto& points = patch.cracks;
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -63,25 +83,29 @@ CrackSegments<Dim>::CrackSegments(const Patch<Dim>& patch, const Lattice<Dim>& l
       if (follows && points[k].index == crack.ends[1] && crack.open[1] && !crack.joined[1])
         add(points[k].crack, x, beyond(points[k - 1].plane));
     }
+  } else {
+    list_triangles(patch, longest_open_end * lattice.spacing().maxCoeff(), cracks, segments_, normals_);
   }
   if (segments_.empty()) return;
   cells_ = patch.cells;
   for (int d = 0; d < Dim; ++d) --cells_.lower[d], ++cells_.upper[d];
-  std::vector<std::pair<int, int>> pairs;  // cell, segment
-  for (std::size_t s = 0; s < segments_.size(); ++s) {
+  std::vector<Box<Dim>> reached;
+  for (const Segment& segment : segments_) {
     Box<Dim> box;
     for (int d = 0; d < Dim; ++d) {
-      const double a = lattice.scaled(d, segments_[s].a[d]), b = lattice.scaled(d, segments_[s].b[d]);
-      box.lower[d] = static_cast<int>(std::floor(std::min(a, b) - point_reach - 0.01));
-      box.upper[d] = static_cast<int>(std::floor(std::max(a, b) + point_reach + 0.01)) + 1;
+      const auto [lower, upper] = extent<Dim>(segment.corners, d);
+      box.lower[d] = static_cast<int>(std::floor(lattice.scaled(d, lower) - point_reach - 0.01));
+      box.upper[d] = static_cast<int>(std::floor(lattice.scaled(d, upper) + point_reach + 0.01)) + 1;
     }
-    for_each(intersection(box, cells_),
-             [&](const Index<Dim>& cell) { pairs.emplace_back(cells_.offset(cell), static_cast<int>(s)); });
+    reached.push_back(intersection(box, cells_));
   }
-  std::sort(pairs.begin(), pairs.end());
   first_.assign(cells_.size() + 1, 0);
-  for (const auto& [cell, segment] : pairs) ++first_[cell + 1], listed_.push_back(segment);
+  for (const Box<Dim>& box : reached) for_each(box, [&](const Index<Dim>& cell) { ++first_[cells_.offset(cell) + 1]; });
   for (std::size_t c = 0; c + 1 < first_.size(); ++c) first_[c + 1] += first_[c];
+  listed_.resize(first_.back());
+  std::vector<int> next(first_.begin(), first_.end() - 1);
+  for (std::size_t s = 0; s < reached.size(); ++s)
+    for_each(reached[s], [&](const Index<Dim>& cell) { listed_[next[cells_.offset(cell)]++] = static_cast<int>(s); });
 }
 
 template <int Dim>
@@ -98,29 +122,31 @@ template <int Dim>
 auto CrackSegments<Dim>::crossed(std::span<const int> near, const Vec<Dim>& x, const Vec<Dim>& node, int body,
                                  const std::vector<Crack>& cracks) const -> Crossings {
   Crossings found;
-  if constexpr (Dim == 2)
-    for (std::size_t k = 0; k < near.size();) {
-      const int crack = segments_[near[k]].crack;
-      const bool cuts = cracks[crack].cuts(body);
-      int sum = 0;
-      Vec<2> normal = Vec<2>::Zero();
-      for (; k < near.size() && segments_[near[k]].crack == crack; ++k) {
-        const Segment& s = segments_[near[k]];
-        if (!cuts || are_apart(x, node, s.a, s.b)) continue;
-        const int sign = crack::crossing(x, node, s.a, s.b);
-        if (sign != 0) sum += sign, normal += s.normal;
-      }
-      if (sum == 0) continue;
-      const int n = found.sides.size();
-      if (n == SideSet::most) {
-        found.crowded = true;
-        break;
-      }
-      found.sides = found.sides.with(crack);
-      double* at = &found.sums[n * NodeCrossings<2>::each];
-      at[NodeCrossings<2>::sign] = sum > 0 ? 1 : -1;
-      Eigen::Map<Vec<2>>(at + NodeCrossings<2>::normal) = normal.normalized();
+  for (std::size_t k = 0; k < near.size();) {
+    const int crack = segments_[near[k]].crack;
+    const bool cuts = cracks[crack].cuts(body);
+    int sum = 0;
+    Vec<Dim> normal = Vec<Dim>::Zero();
+    for (; k < near.size() && segments_[near[k]].crack == crack; ++k) {
+      const Segment& s = segments_[near[k]];
+      if (!cuts) continue;
+      if constexpr (Dim == 3)
+        if (on_one_side(x, node, s.corners[0], s.normal)) continue;
+      if (are_apart<Dim>(x, node, s.corners)) continue;
+      const int sign = crack::crossing(x, node, s.corners);
+      if (sign != 0) sum += sign, normal += s.normal;
     }
+    if (sum == 0) continue;
+    const int n = found.sides.size();
+    if (n == SideSet::most) {
+      found.crowded = true;
+      break;
+    }
+    found.sides = found.sides.with(crack);
+    double* at = &found.sums[n * NodeCrossings<Dim>::each];
+    at[NodeCrossings<Dim>::sign] = sum > 0 ? 1 : -1;
+    Eigen::Map<Vec<Dim>>(at + NodeCrossings<Dim>::normal) = normal.normalized();
+  }
   return found;
 }
 
@@ -129,9 +155,10 @@ double CrackSegments<Dim>::first_meeting(const Vec<Dim>& x, const Vec<Dim>& y, i
   double first = std::numeric_limits<double>::infinity();
   if constexpr (Dim == 2)
     for (const Segment& s : segments_) {
-      const bool beside_tip = s.crack == crack && std::min((s.a - x).norm(), (s.b - x).norm()) < skipped;
-      if (beside_tip || crack::crossing(x, y, s.a, s.b) == 0) continue;
-      const double away = (x - s.a).dot(s.normal), beyond = (y - s.a).dot(s.normal);
+      const auto& [a, b] = s.corners;
+      const bool beside_tip = s.crack == crack && std::min((a - x).norm(), (b - x).norm()) < skipped;
+      if (beside_tip || crack::crossing(x, y, a, b) == 0) continue;
+      const double away = (x - a).dot(s.normal), beyond = (y - a).dot(s.normal);
       first = std::min(first, away / (away - beyond));
     }
   return first;
@@ -143,15 +170,42 @@ Vec<Dim> CrackSegments<Dim>::normal_near(int c, const Vec<Dim>& x) const {
   Vec<Dim> normal = Vec<Dim>::Zero(), sum = Vec<Dim>::Zero();
   for (const Segment& s : segments_) {
     if (s.crack != c) continue;
-    const Vec<Dim> e = s.b - s.a;
-    const double along = std::clamp((x - s.a).dot(e) / e.squaredNorm(), 0.0, 1.0);
-    const double squared = (s.a + along * e - x).squaredNorm();
+    const Vec<Dim>&a = s.corners[0], e = s.corners[1] - a;
+    const double along = std::clamp((x - a).dot(e) / e.squaredNorm(), 0.0, 1.0);
+    const double squared = (a + along * e - x).squaredNorm();
     // A crack point belongs to two segments: the mean of their normals.
     const bool equal = std::abs(squared - nearest) <= 1e-24 * e.squaredNorm() || squared == nearest;
     if (equal) sum += s.normal, normal = sum;
     if (!equal && squared < nearest) nearest = squared, normal = sum = s.normal;
   }
   return normal.squaredNorm() > 0 ? Vec<Dim>(normal.normalized()) : normal;
+}
+
+template <int Dim>
+Vec<Dim> CrackSegments<Dim>::normal_at(const CrackPoint<Dim>& point) const {
+  if constexpr (Dim == 2) return normal_near(point.crack, point.plane);
+  const auto name = [](const auto& p) { return std::tie(p.crack, p.image, p.index); };
+  const auto at = std::lower_bound(normals_.begin(), normals_.end(), point,
+                                   [&](const PointNormal& a, const CrackPoint<Dim>& b) { return name(a) < name(b); });
+  return at != normals_.end() && name(*at) == name(point) ? at->normal : Vec<Dim>(Vec<Dim>::Zero());
+}
+
+template <int Dim>
+double CrackSegments<Dim>::Segment::distance_to(const Vec<Dim>& x) const {
+  const auto to_line = [&](const Vec<Dim>& a, const Vec<Dim>& b) {
+    const Vec<Dim> e = b - a;
+    return (a + std::clamp((x - a).dot(e) / e.squaredNorm(), 0.0, 1.0) * e - x).norm();
+  };
+  double nearest = to_line(corners[0], corners[1]);
+  if constexpr (Dim == 3) {
+    bool above = true;
+    for (int k = 0; k < 3; ++k) {
+      const Vec<3>&a = corners[k], b = corners[(k + 1) % 3];
+      nearest = std::min(nearest, to_line(a, b)), above = above && normal.dot((b - a).cross(x - a)) >= 0;
+    }
+    if (above) nearest = std::min(nearest, std::abs(normal.dot(x - corners[0])));
+  }
+  return nearest;
 }
 
 template <int Dim>
@@ -164,8 +218,16 @@ int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std:
   for (int p = 0; p < piece.points.size(); ++p) {
     Vec<Dim> x;
     for (int d = 0; d < Dim; ++d) x[d] = piece.points.column(d)[p];
-    const auto near = segments.near(x, lattice);
+    auto near = segments.near(x, lattice);
     if (near.empty()) continue;
+    std::vector<int> reached;  // of many triangles few
+    if constexpr (Dim == 3) {
+      const Vec<Dim> most = (point_reach + 1e-6) * lattice.spacing();
+      std::ranges::copy_if(near, std::back_inserter(reached),
+                           [&](int s) { return !are_apart<Dim>(x - most, x + most, segments.all()[s].corners); });
+      if (reached.empty()) continue;
+      near = reached;
+    }
     Box<Dim> around;
     for (int d = 0; d < Dim; ++d) {
       const double xi = lattice.scaled(d, x[d]);

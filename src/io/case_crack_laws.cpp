@@ -51,6 +51,15 @@ void read_interface(Table& table, CrackSpec& crack) {
     table.error("closing_stiffness", "needs normal_stiffness: what cannot open does not close");
 }
 
+/// Surfaces grow in their plane.
+void check_growth_of_surface(Table& table, const GrowthSpec& growth) {
+  if (growth.criterion == GrowthCriterion::steady) table.error("criterion", "must be \"energy\" or \"hoop\" in 3D");
+  if (growth.direction != GrowthDirection::straight)
+    table.error("direction", "must be \"straight\" in 3D: rims grow in the plane of their surface");
+  for (const auto* key : {"most", "cohesive"})
+    if (table.has(key)) table.error(key, "is for growth in 2D");
+}
+
 void read_growth(Table table, CrackSpec& crack, bool has_cohesive) {
   GrowthSpec& growth = crack.growth;
   growth.criterion = table.choice("criterion", growth_criterion_names, std::nullopt);
@@ -68,15 +77,17 @@ void read_growth(Table table, CrackSpec& crack, bool has_cohesive) {
     growth.speed = table.number("speed", std::nullopt, positive);
     growth.energy = table.number("energy", 0.0, not_negative), growth.start = table.number("start", 0.0, not_negative);
   }
-  growth.direction = table.choice("direction", growth_direction_names,
-                                  criterion == GrowthCriterion::hoop ? GrowthDirection::hoop : growth.direction);
+  const bool turns = criterion == GrowthCriterion::hoop && !crack.is_surface();
+  growth.direction =
+      table.choice("direction", growth_direction_names, turns ? GrowthDirection::hoop : growth.direction);
+  if (crack.is_surface()) check_growth_of_surface(table, growth);
   growth.most = table.number("most", infinity, {0, infinity, true, false, true});
   growth.length = table.number("length", growth.length, {0.1, 1, false, true, false});
   growth.every = static_cast<int>(table.integer("every", growth.every, 1, 1000000));
   growth.cohesive = table.boolean("cohesive", false);
   if (growth.cohesive && !has_cohesive)
     table.error("cohesive", "needs the crack's cohesive law: give `cohesive = { strength = ..., energy = ... }`");
-  if (crack.ends[0] != CrackEnd::tip && crack.ends[1] != CrackEnd::tip)
+  if (!crack.is_surface() && crack.ends[0] != CrackEnd::tip && crack.ends[1] != CrackEnd::tip)
     table.error("criterion", "needs a tip that grows; the crack has none: see `ends`");
   table.finish();
 }
@@ -93,6 +104,9 @@ void read_crack_law(Table& table, CrackSpec& crack) {
       table.error(key, "is only for cracks with law = \"interface\"");
   if (crack.law == CrackLaw::interface) read_interface(table, crack);
   const bool has_cohesive = table.has("cohesive");
+  if (has_cohesive && crack.is_surface())
+    for (Table law = table.table("cohesive"); const auto* key : {"from", "to"})
+      if (law.has(key)) law.error(key, "is for 2D: lengths along the crack's line");
   if (has_cohesive) read_cohesive(table.table("cohesive"), crack.cohesive);
   if (crack.law == CrackLaw::cohesive && !has_cohesive)
     table.missing("cohesive", "is missing; give { strength = [...], energy = [...] } for opening and slip");

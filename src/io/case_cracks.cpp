@@ -50,6 +50,30 @@ void check_points_of(Table& table, const Domain& domain, const CrackSpec& crack)
   }
 }
 
+/// The bodies that a crack cuts.
+void read_cut_bodies(Table& table, CrackSpec& crack, const Draft& draft) {
+  if (table.has("bodies")) crack.groups = table.texts("bodies");
+  if (table.has("ids")) crack.ids = table.integers("ids"), check_ids(table, "ids", crack.ids, draft);
+  for (const auto& group : crack.groups)
+    if (draft.bodies_known &&
+        std::ranges::none_of(draft.result.bodies, [&](const auto& b) { return b.group == group; }))
+      table.error("bodies", fmt::format("no body has the group {}", in_quotes(group)));
+}
+
+/// In 3D.
+void read_surface(Table table, Draft& draft) {
+  CrackSpec crack;
+  crack.source = table.where().text();
+  const std::size_t before = table.error_count();
+  read_crack_surface(table, crack, draft);
+  read_cut_bodies(table, crack, draft);
+  read_crack_law(table, crack);
+  table.finish();
+  if (table.error_count() == before && draft.domain_known && draft.bodies_known)
+    check_crack_surface(table, draft.result, crack);
+  draft.result.cracks.push_back(std::move(crack));
+}
+
 void read_crack(Table table, Draft& draft) {
   Case& c = draft.result;
   CrackSpec crack;
@@ -61,11 +85,7 @@ void read_crack(Table table, Draft& draft) {
   for (const auto* key : {"points", "ends", "ids"})
     if (in_grains && table.has(key)) table.error(key, "is found for each grain where `grains` is given; remove it");
   if (table.has("points")) crack.points = table.vectors("points", 2);
-  if (table.has("bodies")) crack.groups = table.texts("bodies");
-  if (table.has("ids")) crack.ids = table.integers("ids"), check_ids(table, "ids", crack.ids, draft);
-  for (const auto& group : crack.groups)
-    if (draft.bodies_known && std::ranges::none_of(c.bodies, [&](const auto& b) { return b.group == group; }))
-      table.error("bodies", fmt::format("no body has the group {}", in_quotes(group)));
+  read_cut_bodies(table, crack, draft);
   if (table.has("ends")) {
     const auto names = table.texts("ends");
     if (names.size() != 2) table.error("ends", "names the two ends; give two of \"open\" and \"tip\"");
@@ -93,7 +113,9 @@ void read_crack(Table table, Draft& draft) {
 
 /// Directions of growth come from stress intensities, which only some laws have.
 void check_hoop_materials(Table& table, const Case& c, const CrackSpec& crack) {
-  if (crack.growth.direction != GrowthDirection::hoop || crack.growth.criterion == GrowthCriterion::none) return;
+  const bool by_intensity = crack.is_surface() && crack.growth.criterion == GrowthCriterion::hoop;
+  const bool turns = crack.growth.direction == GrowthDirection::hoop;
+  if (crack.growth.criterion == GrowthCriterion::none || !(turns || by_intensity)) return;
   for (int b = 0; b < std::ssize(c.bodies); ++b) {
     const Material& material = c.materials[c.bodies[b].material];
     if (!crack.cuts(b, c.bodies[b].group) || is_prescribed(c, b)) continue;
@@ -111,13 +133,8 @@ void check_hoop_materials(Table& table, const Case& c, const CrackSpec& crack) {
 void read_cracks(Table& root, Draft& draft) {
   Case& c = draft.result;
   auto tables = root.tables("cracks");
-  for (Table& table : tables) {
-    if (c.domain.dimension != 2) {
-      table.error("points", "cracks are only for 2D yet; the case has dimension 3");
-      break;
-    }
-    read_crack(std::move(table), draft);
-  }
+  for (Table& table : tables)
+    c.domain.dimension == 3 ? read_surface(std::move(table), draft) : read_crack(std::move(table), draft);
   Table settings = root.table("crack");
   if (draft.bodies_known && root.error_count() == 0)
     for (const CrackSpec& crack : c.cracks) check_hoop_materials(root, c, crack);
@@ -130,6 +147,8 @@ void read_cracks(Table& root, Draft& draft) {
       c.crack.j_radius = {radii[0], radii[1]};
   }
   c.crack.split = static_cast<int>(settings.integer("split", 0, 0, 1000000));
+  if (c.crack.split > 0 && c.domain.dimension == 3)
+    settings.error("split", "is for 2D: parts do not become bodies in 3D yet; remove it");
   settings.finish();
   if (c.cracks.empty()) return;
   Table contact = root.table("contact");

@@ -108,6 +108,10 @@ std::string until_text(const Until& until);
 void read_cracks(Table& root, Draft& draft);
 /// Appends the cracks of an entry that lays one in many bodies.
 void read_grain_cracks(Table table, const CrackSpec& crack, Draft& draft);
+/// The keys of one of them for its surface, in 3D.
+void read_crack_surface(Table& table, CrackSpec& crack, Draft& draft);
+/// Reports surfaces outside the domain or all bodies; finds whether some of the rim is a tip.
+void check_crack_surface(Table& table, const Case& c, CrackSpec& crack);
 /// The keys of one of them for its faces and its growth; after its ends.
 void read_crack_law(Table& table, CrackSpec& crack);
 

@@ -67,36 +67,61 @@ RowBlocks even_share(MPI_Comm comm, std::int64_t total) {
   return rows;
 }
 
-/// A grid of vertices: cell i has one point, point i.
-void write_vertices(TableWriter& writer, MPI_Comm comm, std::int64_t points) {
+/// A grid of cells with so many points each. \param connectivity  writes the cells' points
+template <class F>
+void write_cells(TableWriter& writer, MPI_Comm comm, std::int64_t points, std::int64_t cells, std::int64_t each,
+                 std::uint8_t vtk_type, F&& connectivity) {
   const RowBlocks one = even_share(comm, 1);
-  const std::vector<std::int64_t> number(static_cast<std::size_t>(one.local_rows()), points);
-  for (const char* name : {"NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"})
+  for (const auto& [name, value] : {std::pair("NumberOfPoints", points), std::pair("NumberOfCells", cells),
+                                    std::pair("NumberOfConnectivityIds", each * cells)}) {
+    const std::vector<std::int64_t> number(static_cast<std::size_t>(one.local_rows()), value);
     writer.write(fmt::format("VTKHDF/{}", name), 1, one, std::span(number));
-
+  }
+  connectivity();
+  const RowBlocks of_cells = even_share(comm, cells), offsets = even_share(comm, cells + 1);
   std::vector<std::int64_t> count;
-  const auto row_numbers = [&](const RowBlocks& rows) {
-    return BlockSource<std::int64_t>([&](std::size_t block) {
-      count.resize(static_cast<std::size_t>(rows.blocks[block].count));
-      std::iota(count.begin(), count.end(), rows.blocks[block].file_row);
-      return std::span(count);
-    });
-  };
-  const RowBlocks cells = even_share(comm, points), offsets = even_share(comm, points + 1);
-  writer.write("VTKHDF/Connectivity", 1, cells, row_numbers(cells));
-  writer.write("VTKHDF/Offsets", 1, offsets, row_numbers(offsets));
-  constexpr std::uint8_t vtk_vertex = 1;
+  writer.write("VTKHDF/Offsets", 1, offsets, BlockSource<std::int64_t>([&](std::size_t block) {
+                 count.resize(static_cast<std::size_t>(offsets.blocks[block].count));
+                 for (std::size_t i = 0; i < count.size(); ++i)
+                   count[i] = each * (offsets.blocks[block].file_row + static_cast<std::int64_t>(i));
+                 return std::span(count);
+               }));
   std::vector<std::uint8_t> types;
-  writer.write("VTKHDF/Types", 1, cells, BlockSource<std::uint8_t>([&](std::size_t block) {
-                 types.assign(static_cast<std::size_t>(cells.blocks[block].count), vtk_vertex);
+  writer.write("VTKHDF/Types", 1, of_cells, BlockSource<std::uint8_t>([&](std::size_t block) {
+                 types.assign(static_cast<std::size_t>(of_cells.blocks[block].count), vtk_type);
                  return std::span(types);
                }));
+}
+
+/// A grid of vertices: cell i has one point, point i.
+void write_vertices(TableWriter& writer, MPI_Comm comm, std::int64_t points) {
+  constexpr std::uint8_t vtk_vertex = 1;
+  write_cells(writer, comm, points, points, 1, vtk_vertex, [&] {
+    std::vector<std::int64_t> count;
+    const RowBlocks rows = even_share(comm, points);
+    writer.write("VTKHDF/Connectivity", 1, rows, BlockSource<std::int64_t>([&](std::size_t block) {
+                   count.resize(static_cast<std::size_t>(rows.blocks[block].count));
+                   std::iota(count.begin(), count.end(), rows.blocks[block].file_row);
+                   return std::span(count);
+                 }));
+  });
+}
+
+void write_triangles(TableWriter& writer, MPI_Comm comm, std::int64_t points, const TriangleCells& triangles) {
+  constexpr std::uint8_t vtk_triangle = 5;
+  write_cells(writer, comm, points, triangles.rows.total_rows, 3, vtk_triangle, [&] {
+    RowBlocks rows = triangles.rows;
+    rows.total_rows *= 3;
+    for (auto& block : rows.blocks) block.file_row *= 3, block.count *= 3;
+    writer.write("VTKHDF/Connectivity", 1, rows, triangles.corners);
+  });
 }
 
 }  // namespace
 
 void write_vtkhdf(const std::filesystem::path& file, MPI_Comm comm, const RowBlocks& rows,
-                  std::span<const Column> columns, double time, std::int64_t step, const std::string& kind) {
+                  std::span<const Column> columns, double time, std::int64_t step, const std::string& kind,
+                  const TriangleCells* triangles) {
   const auto position =
       std::find_if(columns.begin(), columns.end(), [](const Column& c) { return c.name == "position"; });
   const bool has_points = position != columns.end() && position->components == 3 && holds_doubles(*position);
@@ -105,14 +130,18 @@ void write_vtkhdf(const std::filesystem::path& file, MPI_Comm comm, const RowBlo
   check_cover(file, comm, rows);
 
   constexpr std::int64_t vertex_bytes = 2 * sizeof(std::int64_t) + sizeof(std::uint8_t);
-  TableWriter writer(file, comm, bytes_of(columns, rows.total_rows) + rows.total_rows * vertex_bytes);
+  const std::int64_t cells = triangles ? 2 * triangles->rows.total_rows : rows.total_rows;  // a triangle takes less
+  TableWriter writer(file, comm, bytes_of(columns, rows.total_rows) + cells * vertex_bytes);
   write_header(writer, kind, rows, time, step);
   writer.add_group("VTKHDF");
   writer.add_group("VTKHDF/PointData");
   const std::int64_t version[2] = {1, 0};
   writer.add_attribute("VTKHDF", "Version", std::span<const std::int64_t>(version));
   writer.add_attribute("VTKHDF", "Type", std::string("UnstructuredGrid"));
-  write_vertices(writer, comm, rows.total_rows);
+  if (triangles)
+    write_triangles(writer, comm, rows.total_rows, *triangles);
+  else
+    write_vertices(writer, comm, rows.total_rows);
   for (const auto& column : columns) {
     const std::string path = column.name == "position" ? "VTKHDF/Points" : "VTKHDF/PointData/" + column.name;
     write_column(writer, path, rows, column);

@@ -74,6 +74,20 @@ void divide_long_segments(Patch<Dim>& patch, const Lattice<Dim>& lattice) {
   if (divided.size() > patch.cracks.size()) patch.cracks = std::move(divided);
 }
 
+void put_triangles(const CrackHeld<3>& point, Message& message) {
+  message.put(std::int64_t{point.tip}), message.put(std::int64_t{point.held});
+  for (std::int32_t t = 0; t < point.held; ++t)
+    for (const std::int64_t value : {point.triangles[t].second, point.triangles[t].third, point.triangles[t].edges})
+      message.put(value);
+}
+
+void take_triangles(CrackHeld<3>& point, const Message& message, std::size_t& at) {
+  point.tip = message.integer(at++) != 0, point.held = static_cast<std::int32_t>(message.integer(at++));
+  for (std::int32_t t = 0; t < point.held; ++t)
+    for (auto* value : {&point.triangles[t].second, &point.triangles[t].third, &point.triangles[t].edges})
+      *value = static_cast<std::int32_t>(message.integer(at++));
+}
+
 }  // namespace
 
 template <int Dim>
@@ -87,6 +101,7 @@ void put_crack_point(const CrackPoint<Dim>& point, Message& message) {
   for (const Vec<Dim>& v :
        {point.plane, point.lower, point.upper, point.lower_velocity, point.upper_velocity, point.traction})
     for (int d = 0; d < Dim; ++d) message.put(v[d]);
+  if constexpr (Dim == 3) put_triangles(point, message);
 }
 
 template <int Dim>
@@ -104,6 +119,7 @@ CrackPoint<Dim> take_crack_point(const Message& message, std::size_t& at) {
   for (Vec<Dim>* v :
        {&point.plane, &point.lower, &point.upper, &point.lower_velocity, &point.upper_velocity, &point.traction})
     for (int d = 0; d < Dim; ++d) (*v)[d] = *message.data(at++);
+  if constexpr (Dim == 3) take_triangles(point, message, at);
   return point;
 }
 

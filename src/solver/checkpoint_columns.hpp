@@ -59,10 +59,11 @@ inline constexpr CrackVector<Dim> crack_vectors[] = {{"crack_plane", &CrackPoint
                                                      {"crack_upper_velocity", &CrackPoint<Dim>::upper_velocity}};
 inline constexpr int crack_numbers = 9;  // crack, index, next, filled, faces_filled, state of the bond, image
 inline constexpr int bond_numbers = 4;   // length, peaks, dissipated
+inline constexpr int held_numbers = 2 + 3 * CrackHeld<3>::most;  // in 3D: tip, triangles held, what they are
 inline constexpr const char* patch_cracks_name = "patch_cracks";
 /// Columns that a case with cracks has more.
 template <int Dim>
-inline constexpr int crack_columns = 3 + static_cast<int>(std::size(crack_vectors<Dim>));
+inline constexpr int crack_columns = 3 + (Dim == 3) + static_cast<int>(std::size(crack_vectors<Dim>));
 
 /// The patches that a checkpoint holds: those of which something has to be remembered.
 struct Layout {

@@ -198,6 +198,26 @@ void read_points(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lay
   in.settle();
 }
 
+/// What crack points hold of triangles.
+void read_triangles(ColumnReader<3>& in, const PatchList<3>& patches, const Layout& layout,
+                    const std::vector<Crack>& cracks) {
+  in.settle();
+  const auto numbers = in.read<std::int32_t>("crack_triangles", held_numbers, layout.cracks);
+  const std::int32_t* n = numbers.data();
+  for (auto* patch : patches)
+    for (auto& point : patch->cracks) {
+      point.tip = n[0] != 0, point.held = n[1];
+      in.require(n[1] >= 0 && n[1] <= CrackHeld<3>::most, "it holds crack points with too many triangles");
+      n += 2;
+      for (CrackTriangle& t : point.triangles) {
+        t = {n[0], n[1], n[2] & 63};
+        for (const std::int32_t other : {t.second, t.third})
+          in.require(other >= 0 && other <= cracks[point.crack].ends[1], "it holds triangles of unknown crack points");
+        n += 3;
+      }
+    }
+}
+
 template <int Dim>
 void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout,
                  const std::vector<Crack>& cracks) {
@@ -228,6 +248,7 @@ void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lay
                  fmt::format("the crack points of patch {} are not in their order", patch.id));
       patch.cracks.push_back(point);
     }
+  if constexpr (Dim == 3) read_triangles(in, patches, layout, cracks);
   for (const auto& vector : crack_vectors<Dim>) {
     const auto values = in.template read<double>(vector.name, Dim, layout.cracks);
     const double* from = values.data();

@@ -185,6 +185,14 @@ void write_cracks(ColumnWriter<Dim>& out, const PatchList<Dim>& patches, const L
   write_counts(out, layout, patch_cracks_name, layout.cracks);
   out.write("crack_numbers", crack_numbers, layout.cracks, numbers);
   out.write("crack_bonds", bond_numbers, layout.cracks, values);
+  if constexpr (Dim == 3) {
+    numbers.clear();
+    for_own([&](const CrackPoint<3>& p) {
+      numbers.insert(numbers.end(), {p.tip, p.held});
+      for (const CrackTriangle& t : p.triangles) numbers.insert(numbers.end(), {t.second, t.third, t.edges});
+    });
+    out.write("crack_triangles", held_numbers, layout.cracks, numbers);
+  }
   for (const auto& vector : crack_vectors<Dim>) {
     values.clear();
     for_own([&](const CrackPoint<Dim>& p) {

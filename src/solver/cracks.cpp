@@ -13,24 +13,8 @@
 namespace cairn {
 namespace {
 
-constexpr double segment_length = 0.5;            // cells, at set-up
 constexpr double on_crack = 1e-3, beside = 0.25;  // cells from a crack at which a point lies on it, or beside it
 constexpr double most_on_crack = 0.1;             // of the points beside it
-
-}  // namespace
-
-std::vector<Vec3> refined_crack(const CrackSpec& spec, double spacing) {
-  std::vector<Vec3> points = {spec.points[0]};
-  for (std::size_t i = 1; i < spec.points.size(); ++i) {
-    const Vec3 from = spec.points[i - 1], step = spec.points[i] - from;
-    const int parts = std::max(1, static_cast<int>(std::ceil(step.norm() / (segment_length * spacing) - 1e-9)));
-    for (int k = 1; k < parts; ++k) points.push_back(from + step * (static_cast<double>(k) / parts));
-    points.push_back(spec.points[i]);
-  }
-  return points;
-}
-
-namespace {
 
 /// How faces meet. An interface that is perfect in a direction binds them there.
 CrackContact contact_of(const CrackSpec& spec) {
@@ -58,9 +42,8 @@ void Simulation<Dim>::define_cracks(const Case& c) {
   for (const Body& body : bodies_) crack_densities_.push_back(body.rigid ? 0.0 : materials_[body.material].density);
   for (const CrackSpec& spec : c.cracks) {
     Crack crack;
-    const auto segments = static_cast<int>(refined_crack(spec, lattice_.smallest_spacing()).size()) - 1;
-    crack.ends = {0, segments * CrackPoint<Dim>::index_step};
-    crack.open = {spec.ends[0] == CrackEnd::open, spec.ends[1] == CrackEnd::open};
+    crack.ends = {0, initial_crack_points<Dim>(c, &spec - c.cracks.data(), lattice_.smallest_spacing()).back().index};
+    if (Dim == 2) crack.open = {spec.ends[0] == CrackEnd::open, spec.ends[1] == CrackEnd::open};
     crack.all_bodies = spec.cuts_all();
     for (std::size_t b = 0; b < c.bodies.size() && !crack.all_bodies; ++b)
       if (spec.cuts(static_cast<int>(b), c.bodies[b].group)) crack.bodies.push_back(static_cast<int>(b));
@@ -72,26 +55,24 @@ void Simulation<Dim>::define_cracks(const Case& c) {
   define_tractions(c);
 }
 
-/// Calls f(crack, index, position, patch) for every point of the case's cracks, with the patch whose cells hold it.
+/// Calls f(point, patch) for every point of the case's cracks, with the patch whose cells hold it.
 template <int Dim>
 template <class F>
 void Simulation<Dim>::for_crack_points(const Case& c, F&& f) const {
-  for (std::size_t k = 0; k < c.cracks.size(); ++k) {
-    const auto line = refined_crack(c.cracks[k], lattice_.smallest_spacing());
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      const Vec<Dim> x = line[i].template head<Dim>();
+  for (std::size_t k = 0; k < c.cracks.size(); ++k)
+    for (const auto& point : initial_crack_points<Dim>(c, k, lattice_.smallest_spacing())) {
       Index<Dim> cell;
       for (int d = 0; d < Dim; ++d)
-        cell[d] = std::clamp(static_cast<int>(std::floor(lattice_.scaled(d, x[d]))), 0, lattice_.cells()[d] - 1);
-      f(static_cast<int>(k), static_cast<int>(i), x, lattice_.patch_of_cell(cell));
+        cell[d] =
+            std::clamp(static_cast<int>(std::floor(lattice_.scaled(d, point.plane[d]))), 0, lattice_.cells()[d] - 1);
+      f(point, lattice_.patch_of_cell(cell));
     }
-  }
 }
 
 template <int Dim>
 std::vector<PatchId> Simulation<Dim>::patches_of_cracks(const Case& c) const {
   std::vector<PatchId> patches;
-  for_crack_points(c, [&](int, int, const Vec<Dim>&, PatchId patch) { patches.push_back(patch); });
+  for_crack_points(c, [&](const CrackPoint<Dim>&, PatchId patch) { patches.push_back(patch); });
   std::ranges::sort(patches);
   const auto rest = std::ranges::unique(patches);
   patches.erase(rest.begin(), rest.end());
@@ -101,11 +82,7 @@ std::vector<PatchId> Simulation<Dim>::patches_of_cracks(const Case& c) const {
 /// Gives every crack point to the patch whose cells hold it.
 template <int Dim>
 void Simulation<Dim>::place_cracks(const Case& c) {
-  for_crack_points(c, [&](int crack, int index, const Vec<Dim>& x, PatchId id) {
-    CrackPoint<Dim> point;
-    point.crack = crack, point.index = index * CrackPoint<Dim>::index_step;
-    point.next = std::min(point.index + CrackPoint<Dim>::index_step, cracks_[crack].ends[1]);
-    point.plane = point.lower = point.upper = x;
+  for_crack_points(c, [&](const CrackPoint<Dim>& point, PatchId id) {
     const auto patch = std::ranges::lower_bound(patches_, id, {}, &Patch<Dim>::id);
     if (patch != patches_.end() && patch->id == id) patch->cracks.push_back(point);
   });
@@ -136,9 +113,7 @@ void Simulation<Dim>::check_points_on_cracks(const Case& c) {
         for (int d = 0; d < Dim; ++d) x[d] = piece.points.column(d)[p];
         for (const int s : segments.near(x, lattice_)) {
           const auto& segment = segments.all()[s];
-          const Vec<Dim> e = segment.b - segment.a;
-          const double along = std::clamp((x - segment.a).dot(e) / e.squaredNorm(), 0.0, 1.0);
-          const double away = (segment.a + along * e - x).norm();
+          const double away = segment.distance_to(x);
           if (!cracks_[segment.crack].cuts(piece.body) || !(away < beside * h)) continue;
           Count& count = counts[{segment.crack, piece.body}];
           if (away < on_crack * h && count.on++ == 0) count.first = x;

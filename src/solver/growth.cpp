@@ -15,7 +15,7 @@ constexpr double slope = 0.55;    // of the share of a full body across its surf
 constexpr double own_line = 2.0;  // cells of its own line that a tip does not meet
 
 /// Whether a tip's criterion is met; steady growth begins or goes on.
-bool is_driven(const GrowthSpec& growth, const TipState& tip, Crack& crack, double segment, double time) {
+bool is_driven(const GrowthSpec& growth, const TipState<2>& tip, Crack& crack, double segment, double time) {
   const int end = tip.tip.end;
   if (growth.criterion == GrowthCriterion::hoop)
     return largest_hoop_stress(tip.K_opening, tip.K_sliding).intensity >= growth.toughness;
@@ -42,7 +42,7 @@ auto Simulation<Dim>::find_advances() -> std::vector<Advance> {
   std::vector<Advance> advances;
   if constexpr (Dim == 2) {
     const double h = lattice_.smallest_spacing();
-    for (const TipState& tip : tip_states()) {
+    for (const TipState<2>& tip : tip_states()) {
       const GrowthSpec& growth = growth_[tip.tip.crack];
       Crack& crack = cracks_[tip.tip.crack];
       const double segment = growth.length * h;
@@ -130,6 +130,7 @@ void Simulation<Dim>::grow_cracks() {
     return growth.criterion != GrowthCriterion::none && steps_ % growth.every == 0;
   };
   if (steps_ == 0 || std::ranges::none_of(growth_, due)) return;
+  if (Dim == 3) return grow_rims();
   auto advances = find_advances();
   if (advances.empty()) return;
   meet_obstacles(advances);

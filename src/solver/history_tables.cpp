@@ -42,7 +42,10 @@ std::vector<std::string> force_columns() {
           "wz",   "fx",   "fy",   "fz",   "mx", "my", "mz", "impulse_x", "impulse_y", "impulse_z", "work"};
 }
 
-std::vector<std::string> tip_columns() {
+std::vector<std::string> tip_columns(int dimension) {
+  if (dimension == 3)
+    return {"step",    "time",    "crack", "index", "x",        "y",   "z",    "ahead_x",
+            "ahead_y", "ahead_z", "grown", "J",     "J_static", "K_I", "K_II", "K_III"};
   return {"step", "time", "crack", "end", "x", "y", "ahead_x", "ahead_y", "grown", "J", "J_static", "K_I", "K_II"};
 }
 
@@ -61,9 +64,9 @@ void HistoryTables<Dim>::open(const RunState* from) {
   else if (with_forces_)
     forces_ = CsvWriter(forces, force_columns());
   if (go_on && from->tips_file.bytes > 0)
-    tips_ = CsvWriter(out_ / "tips.csv", tip_columns(), from->tips_file);
+    tips_ = CsvWriter(out_ / "tips.csv", tip_columns(Dim), from->tips_file);
   else if (with_tips_)
-    tips_ = CsvWriter(out_ / "tips.csv", tip_columns());
+    tips_ = CsvWriter(out_ / "tips.csv", tip_columns(Dim));
 }
 
 template <int Dim>
@@ -141,12 +144,12 @@ void HistoryTables<Dim>::add_forces(const Simulation<Dim>& simulation) {
 
 template <int Dim>
 void HistoryTables<Dim>::add_tips(Simulation<Dim>& simulation) {
-  for (const TipState& s : simulation.tip_states()) {
+  for (const TipState<Dim>& s : simulation.tip_states()) {
     std::vector<CsvValue> row = {simulation.steps(), simulation.time(), std::int64_t{s.tip.crack},
                                  std::int64_t{s.tip.end}};
-    for (const double value : {s.tip.position.x(), s.tip.position.y(), s.tip.ahead.x(), s.tip.ahead.y(), s.length, s.J,
-                               s.J_static, s.K_opening, s.K_sliding})
-      row.emplace_back(value);
+    for (const Vec<Dim>& v : {s.tip.position, s.tip.ahead}) row.insert(row.end(), v.data(), v.data() + Dim);
+    for (const double value : {s.length, s.J, s.J_static, s.K_opening, s.K_sliding}) row.emplace_back(value);
+    if (Dim == 3) row.emplace_back(s.K_tearing);
     tips_.add_row(row);
   }
 }

@@ -13,7 +13,7 @@ namespace cairn {
 std::vector<std::string> history_columns(int dimension);
 std::vector<std::string> body_columns(int dimension);
 std::vector<std::string> force_columns();
-std::vector<std::string> tip_columns();
+std::vector<std::string> tip_columns(int dimension);
 
 template <int Dim>
 class HistoryTables {

@@ -1,63 +1,14 @@
 #include "cairn/solver/output.hpp"
 
-#include <deque>
 #include <numeric>
 
-#include "cairn/io/table_file.hpp"
 #include "cairn/solver/body_states.hpp"
+#include "columns.hpp"
 
 namespace cairn {
 namespace {
 
 constexpr std::string_view smooth_stress_field = "stress_smooth";
-
-/// Columns under construction; keeps their numbers alive until the file is written.
-class Columns {
- public:
-  std::vector<double>& add_doubles(const std::string& name, int components) { return add(name, components, doubles_); }
-  std::vector<std::int32_t>& add_ints(const std::string& name, int components) { return add(name, components, ints_); }
-
-  std::vector<Column> view() const {
-    std::vector<Column> columns;
-    for (const auto& [name, components, values] : columns_)
-      std::visit(
-          [&, &name = name, &components = components](const auto* list) {
-            columns.push_back({name, components, std::span(*list)});
-          },
-          values);
-    return columns;
-  }
-
- private:
-  template <class T>
-  std::vector<T>& add(const std::string& name, int components, std::deque<std::vector<T>>& store) {
-    store.emplace_back();
-    columns_.emplace_back(name, components, &store.back());
-    return store.back();
-  }
-  using Values = std::variant<const std::vector<double>*, const std::vector<std::int32_t>*>;
-  std::deque<std::vector<double>> doubles_;
-  std::deque<std::vector<std::int32_t>> ints_;
-  std::vector<std::tuple<std::string, int, Values>> columns_;
-};
-
-/// Rows of this rank's patches, of which each has count_of(patch): in the file they lie in patch order. Collective.
-template <int Dim, class F>
-RowBlocks patch_rows(const Simulation<Dim>& simulation, F&& count_of) {
-  const PatchTable<Dim>& table = simulation.table();
-  std::vector<std::int64_t> counts(table.size(), 0);
-  for (const auto& patch : simulation.patches()) counts[table.find(patch.id)] = count_of(patch);
-  MPI_Allreduce(MPI_IN_PLACE, counts.data(), static_cast<int>(counts.size()), MPI_INT64_T, MPI_SUM,
-                simulation.communicator());
-  RowBlocks rows;
-  auto patch = simulation.patches().begin();
-  for (std::size_t i = 0; i < counts.size(); rows.total_rows += counts[i], ++i)
-    if (patch != simulation.patches().end() && patch->id == table.patches()[i]) {
-      if (counts[i] > 0) rows.blocks.push_back({rows.total_rows, counts[i]});
-      ++patch;
-    }
-  return rows;
-}
 
 template <int Dim>
 RowBlocks point_rows(const Simulation<Dim>& simulation) {
@@ -189,8 +140,6 @@ class PointTable {
   std::tuple<std::vector<double>, std::vector<std::int32_t>, std::vector<std::int64_t>> buffers_;
 };
 
-void append(std::vector<double>& out, const Vec3& v) { out.insert(out.end(), v.data(), v.data() + 3); }
-
 }  // namespace
 
 template <int Dim>
@@ -203,72 +152,6 @@ void write_particles(Simulation<Dim>& simulation, const std::filesystem::path& f
     if (field != "position") table.add(field);
   write_vtkhdf(file, simulation.communicator(), point_rows(simulation), table.view(), simulation.time(),
                simulation.steps());
-}
-
-template <int Dim>
-void write_cracks(const Simulation<Dim>& simulation, const std::filesystem::path& file) {
-  Columns columns;
-  auto& position = columns.add_doubles("position", 3);
-  auto& lower = columns.add_doubles("lower", 3);
-  auto& upper = columns.add_doubles("upper", 3);
-  auto& opening = columns.add_doubles("opening", 3);
-  auto& crack = columns.add_ints("crack", 1);
-  auto& index = columns.add_ints("index", 1);
-  auto& image = columns.add_ints("image", 3);
-  auto& bond = columns.add_ints("bond", 1);
-  auto& parted = columns.add_ints("parted", 1);
-  auto& traction = columns.add_doubles("traction", 3);
-  auto& length = columns.add_doubles("length", 1);
-  auto& stored = columns.add_doubles("stored", 1);
-  auto& dissipated = columns.add_doubles("dissipated", 1);
-  const auto padded = [](const Vec<Dim>& v) {
-    Vec3 p = Vec3::Zero();
-    p.template head<Dim>() = v;
-    return p;
-  };
-  for (const auto& patch : simulation.patches())
-    for (const auto& p : patch.cracks) {
-      if (!p.own) continue;
-      append(position, padded(p.plane)), append(lower, padded(p.lower)), append(upper, padded(p.upper));
-      append(opening, padded(p.opening()));
-      crack.push_back(p.crack), index.push_back(p.index);
-      for (int d = 0; d < 3; ++d) image.push_back(d < Dim ? p.image[d] : 0);
-      const auto energies = simulation.energies_of(p);
-      parted.push_back(simulation.cracks()[p.crack].idle);
-      bond.push_back(p.bond.state), length.push_back(p.bond.length), append(traction, padded(p.traction));
-      stored.push_back(energies[0]), dissipated.push_back(energies[1]);
-    }
-  const RowBlocks rows = patch_rows(
-      simulation, [](const Patch<Dim>& patch) { return std::ranges::count_if(patch.cracks, &CrackPoint<Dim>::own); });
-  write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(),
-               "crack points");
-}
-
-template <int Dim>
-void write_tips(Simulation<Dim>& simulation, const std::filesystem::path& file) {
-  const auto states = simulation.tip_states();
-  int rank = 0;
-  MPI_Comm_rank(simulation.communicator(), &rank);
-  Columns columns;
-  auto& position = columns.add_doubles("position", 3);
-  auto& ahead = columns.add_doubles("ahead", 3);
-  auto& crack = columns.add_ints("crack", 1);
-  auto& end = columns.add_ints("end", 1);
-  std::array<std::vector<double>*, 4> numbers{};
-  constexpr const char* names[] = {"J", "J_static", "K_I", "K_II"};
-  for (int i = 0; i < 4; ++i) numbers[i] = &columns.add_doubles(names[i], 1);
-  RowBlocks rows{{}, std::ssize(states)};
-  if (rank == 0 && !states.empty()) rows.blocks.push_back({0, rows.total_rows});
-  for (const TipState& s : states) {
-    if (rank != 0) break;
-    append(position, Vec3(s.tip.position.x(), s.tip.position.y(), 0));
-    append(ahead, Vec3(s.tip.ahead.x(), s.tip.ahead.y(), 0));
-    crack.push_back(s.tip.crack), end.push_back(s.tip.end);
-    const double values[] = {s.J, s.J_static, s.K_opening, s.K_sliding};
-    for (int i = 0; i < 4; ++i) numbers[i]->push_back(values[i]);
-  }
-  write_vtkhdf(file, simulation.communicator(), rows, columns.view(), simulation.time(), simulation.steps(),
-               "tips of cracks");
 }
 
 template <int Dim>
@@ -326,8 +209,6 @@ void write_contacts(const Simulation<Dim>& simulation, const std::filesystem::pa
 
 #define CAIRN_INSTANTIATE(Dim)                                                                                    \
   template void write_particles(Simulation<Dim>&, const std::filesystem::path&, const std::vector<std::string>&); \
-  template void write_cracks(const Simulation<Dim>&, const std::filesystem::path&);                               \
-  template void write_tips(Simulation<Dim>&, const std::filesystem::path&);                                       \
   template void write_grains(const Simulation<Dim>&, const std::filesystem::path&);                               \
   template void write_contacts(const Simulation<Dim>&, const std::filesystem::path&, double);
 CAIRN_INSTANTIATE(2)

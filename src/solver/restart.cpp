@@ -111,7 +111,7 @@ std::string check_folder(const Case& c, const fs::path& out, const RunState& sta
       error = check_prefix(bodies, body_columns(dimension), state.bodies_file);
     if (error.empty() && state.forces_file.bytes > 0) error = check_prefix(forces, force_columns(), state.forces_file);
     if (error.empty() && state.tips_file.bytes > 0)
-      error = check_prefix(out / "tips.csv", tip_columns(), state.tips_file);
+      error = check_prefix(out / "tips.csv", tip_columns(dimension), state.tips_file);
     return error.empty() ? "" : error + remedy;
   }
   std::error_code ignored;

@@ -2,18 +2,21 @@
 
 #include <map>
 
+#include "cairn/crack/rim.hpp"
 #include "cairn/solver/simulation.hpp"
 
 namespace cairn {
 namespace {
 
+constexpr double hat = 1.5;  // cells, of q along a rim to each side of a point
+
 /// Elastic constants at a tip where the law is linear for small strains; none else.
 template <int Dim>
-void set_moduli(CrackTip& tip, const Material& material) {
+void set_moduli(CrackTip<Dim>& tip, const Material& material) {
   if (material.model != "hypoelastic" && material.model != "neo_hookean") return;
   const double mu = material.parameters.at("shear_modulus"), bulk = material.parameters.at("bulk_modulus");
   const double nu = (3 * bulk - 2 * mu) / (2 * (3 * bulk + mu)), E = 2 * mu * (1 + nu);
-  const bool strain = material.plane == Plane::strain;
+  const bool strain = Dim == 3 || material.plane == Plane::strain;
   tip.modulus = strain ? E / (1 - nu * nu) : E;
   tip.kappa = strain ? 3 - 4 * nu : (3 - nu) / (1 + nu);
   tip.shear_modulus = mu;
@@ -21,40 +24,58 @@ void set_moduli(CrackTip& tip, const Material& material) {
 
 /// Continuous distance from the tip, the shortest across periodic boundaries.
 template <int Dim>
-Vec<2> beside(const Lattice<Dim>& lattice, Vec<2> x, const Vec<2>& tip) {
-  for (int d = 0; d < 2; ++d)
+Vec<Dim> beside(const Lattice<Dim>& lattice, Vec<Dim> x, const Vec<Dim>& tip) {
+  for (int d = 0; d < Dim; ++d)
     if (lattice.periodic(d)) x[d] -= lattice.length(d) * std::round((x[d] - tip[d]) / lattice.length(d));
   return x;
 }
 
 }  // namespace
 
-/// The tips, ascending in (crack, end), the same on every rank. Collective.
 template <int Dim>
-std::vector<CrackTip> Simulation<Dim>::find_tips() const {
-  std::vector<double> mine;
-  for (const auto& patch : patches_)
+std::vector<CrackTip<Dim>> Simulation<Dim>::own_tips(const Patch<Dim>& patch) const {
+  std::vector<CrackTip<Dim>> tips;
+  if constexpr (Dim == 3) {
+    const double h = lattice_.smallest_spacing();
+    const CrackSegments<3> triangles(patch, lattice_, cracks_);
+    return rim_of_patch(patch, triangles, hat * h, j_radius_[0] * h, j_radius_[1] * h);
+  } else {
     for (std::size_t k = 0; k < patch.cracks.size(); ++k) {
       const auto& point = patch.cracks[k];
       for (int end = 0; end < 2; ++end) {
         const Crack& crack = cracks_[point.crack];
         if (!point.own || crack.open[end] || point.index != crack.ends[end]) continue;
         const auto& before = patch.cracks[end == 0 ? k + 1 : k - 1];
-        const Vec<Dim> ahead = (point.plane - before.plane).normalized();
-        mine.insert(mine.end(), {static_cast<double>(point.crack), static_cast<double>(end), point.plane[0],
-                                 point.plane[1], ahead[0], ahead[1]});
+        CrackTip<Dim> tip;
+        tip.crack = point.crack, tip.end = end, tip.position = point.plane, tip.normal.setZero();
+        tip.ahead = (point.plane - before.plane).normalized();
+        tips.push_back(tip);
       }
     }
+    return tips;
+  }
+}
+
+/// The tips, ascending in (crack, end), the same on every rank. Collective.
+template <int Dim>
+std::vector<CrackTip<Dim>> Simulation<Dim>::find_tips() const {
+  std::vector<double> mine;
+  for (const auto& patch : patches_)
+    for (const auto& tip : own_tips(patch)) {
+      mine.insert(mine.end(), {static_cast<double>(tip.crack), static_cast<double>(tip.end), tip.hat, tip.weight});
+      for (const Vec<Dim>& v : {tip.position, tip.ahead, tip.normal}) mine.insert(mine.end(), v.data(), v.data() + Dim);
+    }
   const std::vector<double> all = gather_on_all(mine, comm_);
-  std::vector<CrackTip> tips;
-  for (std::size_t i = 0; i < all.size(); i += 6) {
-    CrackTip tip;
+  std::vector<CrackTip<Dim>> tips;
+  for (std::size_t i = 0; i < all.size(); i += 4 + 3 * Dim) {
+    using Map = Eigen::Map<const Vec<Dim>>;
+    CrackTip<Dim> tip;
     tip.crack = static_cast<int>(all[i]), tip.end = static_cast<int>(all[i + 1]);
-    tip.position = {all[i + 2], all[i + 3]}, tip.ahead = {all[i + 4], all[i + 5]};
+    tip.hat = all[i + 2], tip.weight = all[i + 3];
+    tip.position = Map(&all[i + 4]), tip.ahead = Map(&all[i + 4 + Dim]), tip.normal = Map(&all[i + 4 + 2 * Dim]);
     tips.push_back(tip);
   }
-  std::sort(tips.begin(), tips.end(),
-            [](const CrackTip& a, const CrackTip& b) { return std::pair(a.crack, a.end) < std::pair(b.crack, b.end); });
+  std::ranges::sort(tips, {}, [](const CrackTip<Dim>& tip) { return std::pair(tip.crack, tip.end); });
   return tips;
 }
 
@@ -90,31 +111,30 @@ double Simulation<Dim>::find_motion() {
 
 /// What contact forces between faces add to the integrals: those of the step that `find_motion` took.
 template <int Dim>
-void Simulation<Dim>::add_face_terms(std::size_t p, const std::vector<CrackTip>& tips, double dt,
+void Simulation<Dim>::add_face_terms(std::size_t p, const std::vector<CrackTip<Dim>>& tips, double dt,
                                      std::vector<TipSums>& sums) const {
-  if constexpr (Dim == 2) {
-    const double h = lattice_.smallest_spacing();
-    sweeps_[p].for_forces_across(dt, [&](const Index<2>& place, int crack, const Vec<2>& force) {
-      Vec<2> x;
-      for (int d = 0; d < 2; ++d) x[d] = lattice_.node_position(d, place[d]);
-      for (std::size_t t = 0; t < tips.size(); ++t) {
-        if (tips[t].crack != crack) continue;
-        const Vec<2> near = beside(lattice_, x, tips[t].position);
-        // Above is left of the crack's direction, and of the tip's at its last end alone.
-        const Vec<2> on_left = tips[t].end == 1 ? force : Vec<2>(-force);
-        const TipSums add = face_terms(tips[t], near, on_left, h, j_radius_[0] * h, j_radius_[1] * h);
-        sums[t].I_opening += add.I_opening, sums[t].I_sliding += add.I_sliding;
-      }
-    });
-  }
+  const double h = lattice_.smallest_spacing();
+  sweeps_[p].for_forces_across(dt, [&](const Index<Dim>& place, int crack, const Vec<Dim>& force) {
+    Vec<Dim> x;
+    for (int d = 0; d < Dim; ++d) x[d] = lattice_.node_position(d, place[d]);
+    for (std::size_t t = 0; t < tips.size(); ++t) {
+      if (tips[t].crack != crack) continue;
+      const Vec<Dim> near = beside(lattice_, x, tips[t].position);
+      // In 2D above is left of the crack's direction, and of the tip's at its last end alone.
+      const Vec<Dim> on_left = Dim == 3 || tips[t].end == 1 ? force : Vec<Dim>(-force);
+      const TipSums add = face_terms(tips[t], near, on_left, h, j_radius_[0] * h, j_radius_[1] * h);
+      sums[t].I_opening += add.I_opening, sums[t].I_sliding += add.I_sliding, sums[t].I_tearing += add.I_tearing;
+    }
+  });
 }
 
 /// What a patch's points add to the tips' integrals.
 template <int Dim>
-void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip>& tips,
+void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip<Dim>>& tips,
                                     std::vector<TipSums>& sums) const {
   using C = PointColumns<Dim>;
   const double h = lattice_.smallest_spacing(), inner = j_radius_[0] * h, outer = j_radius_[1] * h;
+  const double reach = Dim == 3 ? std::hypot(outer, hat * h) : outer;
   for (const auto& piece : patch.pieces) {
     if (is_rigid(piece) || piece.points.size() == 0) continue;
     const Points<Dim>& points = piece.points;
@@ -126,15 +146,16 @@ void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<C
           for (std::size_t t = 0; t < tips.size(); ++t)
             for (int p = 0; p < points.size(); ++p) {
               if (!cracks_[tips[t].crack].cuts(piece.body)) break;
-              TipPoint at;
-              at.position = beside(lattice_, Vec<2>(points.column(0)[p], points.column(1)[p]), tips[t].position);
-              if ((at.position - tips[t].position).squaredNorm() >= outer * outer) continue;
+              TipPoint<Dim> at;
+              for (int d = 0; d < Dim; ++d) at.position[d] = points.column(d)[p];
+              at.position = beside(lattice_, at.position, tips[t].position);
+              if ((at.position - tips[t].position).squaredNorm() >= reach * reach) continue;
               if (kinematics.empty()) kinematics = point_kinematics(piece, lattice_, transfer_);
               Tensor<Dim, double> F;
               for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
-              for (int i = 0; i < 2; ++i) {
+              for (int i = 0; i < Dim; ++i) {
                 at.velocity[i] = points.column(C::velocity + i)[p], at.acceleration[i] = kinematics[p][i];
-                for (int j = 0; j < 2; ++j) {
+                for (int j = 0; j < Dim; ++j) {
                   at.stress(i, j) = points.column(C::stress + symmetric_index<Dim>(i, j))[p];
                   at.H(i, j) = F.c[tensor_index<Dim>(i, j)] - (i == j);
                   at.L(i, j) = kinematics[p][Dim + Dim * i + j];
@@ -144,9 +165,7 @@ void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<C
               at.volume = J * points.column(C::volume)[p], at.density = material.density / J;
               for (int s = 0; s < points.columns() - C::state; ++s) state[s] = points.column(C::state + s)[p];
               at.energy = law.strain_energy(F, state.data()) / J;
-              const TipSums add = tip_terms(tips[t], at, inner, outer);
-              sums[t].J += add.J, sums[t].J_static += add.J_static;
-              sums[t].I_opening += add.I_opening, sums[t].I_sliding += add.I_sliding;
+              sums[t].add(tip_terms(tips[t], at, inner, outer));
             }
         },
         material.law);
@@ -154,13 +173,12 @@ void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<C
 }
 
 template <int Dim>
-std::vector<TipState> Simulation<Dim>::tip_states() {
-  if constexpr (Dim == 3) return {};
+std::vector<TipState<Dim>> Simulation<Dim>::tip_states() {
   if (cracks_.empty()) return {};
   finish_speed_reduction();
-  std::vector<CrackTip> tips = find_tips();
+  std::vector<CrackTip<Dim>> tips = find_tips();
   if (tips.empty()) return {};
-  for (CrackTip& tip : tips) {
+  for (auto& tip : tips) {
     const auto& cut = cracks_[tip.crack];
     for (std::size_t b = 0; b < bodies_.size(); ++b)
       if (cut.cuts(static_cast<int>(b)) && !bodies_[b].rigid) {
@@ -175,34 +193,42 @@ std::vector<TipState> Simulation<Dim>::tip_states() {
     add_tip_terms(patches_[p], tips, sums);
     if (!patches_[p].pieces.empty()) add_face_terms(p, tips, dt, sums);
     mine.push_back(static_cast<double>(patches_[p].id));
-    for (const TipSums& s : sums) mine.insert(mine.end(), {s.J, s.J_static, s.I_opening, s.I_sliding});
+    for (const TipSums& s : sums) mine.insert(mine.end(), {s.J, s.J_static, s.I_opening, s.I_sliding, s.I_tearing});
   }
   const std::vector<double> all = gather_on_all(mine, comm_);
   const std::size_t row = 1 + TipSums::size * tips.size();
   std::map<double, const double*> by_patch;
   for (std::size_t i = 0; i < all.size(); i += row) by_patch[all[i]] = &all[i + 1];
-  std::vector<TipState> states;
+  std::vector<TipState<Dim>> states;
   for (std::size_t t = 0; t < tips.size(); ++t) {
     TipSums sum;
     for (const auto& [patch, values] : by_patch) {
       const double* v = values + TipSums::size * t;
-      sum.J += v[0], sum.J_static += v[1], sum.I_opening += v[2], sum.I_sliding += v[3];
+      sum.add({v[0], v[1], v[2], v[3], v[4]});
     }
-    const double half = tips[t].modulus > 0 ? 0.5 * tips[t].modulus : std::numeric_limits<double>::quiet_NaN();
-    states.push_back({tips[t], sum.J, sum.J_static, half * sum.I_opening, half * sum.I_sliding,
-                      cracks_[tips[t].crack].grown[tips[t].end]});
+    const CrackTip<Dim>& tip = tips[t];
+    const double none = std::numeric_limits<double>::quiet_NaN(), half = tip.modulus > 0 ? 0.5 * tip.modulus : none;
+    TipState<Dim> state{tip, sum.J, sum.J_static, half * sum.I_opening, half * sum.I_sliding};
+    if (Dim == 2) state.length = cracks_[tip.crack].grown[tip.end];
+    if (Dim == 3) {
+      state.K_tearing = tip.modulus > 0 ? tip.shear_modulus * sum.I_tearing : none;
+      for (double* value : {&state.J, &state.J_static, &state.K_opening, &state.K_sliding, &state.K_tearing})
+        *value /= tip.weight;
+    }
+    states.push_back(state);
   }
   return states;
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                         \
-  template std::vector<CrackTip> Simulation<Dim>::find_tips() const;                                                   \
-  template double Simulation<Dim>::find_motion();                                                                      \
-  template void Simulation<Dim>::add_face_terms(std::size_t, const std::vector<CrackTip>&, double,                     \
-                                                std::vector<TipSums>&) const;                                          \
-  template void Simulation<Dim>::add_tip_terms(const Patch<Dim>&, const std::vector<CrackTip>&, std::vector<TipSums>&) \
-      const;                                                                                                           \
-  template std::vector<TipState> Simulation<Dim>::tip_states();
+#define CAIRN_INSTANTIATE(Dim)                                                                          \
+  template std::vector<CrackTip<Dim>> Simulation<Dim>::own_tips(const Patch<Dim>&) const;               \
+  template std::vector<CrackTip<Dim>> Simulation<Dim>::find_tips() const;                               \
+  template double Simulation<Dim>::find_motion();                                                       \
+  template void Simulation<Dim>::add_face_terms(std::size_t, const std::vector<CrackTip<Dim>>&, double, \
+                                                std::vector<TipSums>&) const;                           \
+  template void Simulation<Dim>::add_tip_terms(const Patch<Dim>&, const std::vector<CrackTip<Dim>>&,    \
+                                               std::vector<TipSums>&) const;                            \
+  template std::vector<TipState<Dim>> Simulation<Dim>::tip_states();
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

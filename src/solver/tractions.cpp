@@ -71,8 +71,11 @@ void Simulation<Dim>::bind_faces(const Case& c) {
       const CrackSpec& spec = c.cracks[point.crack];
       if (spec.law != CrackLaw::interface && spec.law != CrackLaw::cohesive) continue;
       auto& of_crack = lengths[point.crack];
-      if (of_crack.empty()) of_crack = bound_lengths(c, spec, refined_crack(spec, lattice_.smallest_spacing()));
-      point.bond.length = of_crack[point.index / CrackPoint<Dim>::index_step];
+      const double h = lattice_.smallest_spacing();
+      if (of_crack.empty())
+        of_crack =
+            Dim == 3 ? bound_areas(c, spec, crack_surface(spec, h)) : bound_lengths(c, spec, refined_crack(spec, h));
+      point.bond.length = of_crack[Dim == 3 ? point.index : point.index / CrackPoint<Dim>::index_step];
       if (point.bond.length > 0) point.bond.state = Bond::holds;
     }
 }
@@ -84,11 +87,12 @@ struct Opening {
   TractionLaw::Modes d{};
 
   Opening(const CrackSegments<Dim>& segments, const CrackPoint<Dim>& point, const Vec<Dim>& opening) {
-    if constexpr (Dim == 2) {
-      normal = segments.normal_near(point.crack, point.plane);
+    normal = segments.normal_at(point);
+    if constexpr (Dim == 2)
       along = {normal.y(), -normal.x()};
-      d = {opening.dot(normal), opening.dot(along)};
-    }
+    else
+      along = (opening - opening.dot(normal) * normal).normalized();
+    d = {opening.dot(normal), opening.dot(along)};
   }
 };
 

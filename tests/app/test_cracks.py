@@ -85,6 +85,95 @@ ERRORS = {  # what is wrong, and a part of the message
     'growth = { criterion = "energy", energy = 1.0, cohesive = true }': "needs the crack's cohesive law",
 }
 
+# Two balls that collide in 3D: a round crack inside, one from side to side, and a surface from a file.
+BALLS = """
+title = "Cracked balls"
+
+[domain]
+dimension = 3
+lower = [0.0, 0.0, 0.0]
+upper = [1.0, 1.0, 1.0]
+cells = [15, 15, 15]
+patch_cells = 5
+
+[time]
+cfl = 0.3
+steps = 40
+
+[materials.soft]
+model = "neo_hookean"
+density = 1000.0
+shear_modulus = 4.0e3
+bulk_modulus = 8.0e3
+
+[[bodies]]
+shape = { type = "sphere", centre = [0.33, 0.41, 0.47], radius = 0.22 }
+material = "soft"
+velocity = [0.8, 0.1, 0.2]
+angular_velocity = [0.0, 0.0, 2.0]
+group = "left"
+
+[[bodies]]
+shape = { type = "sphere", centre = [0.69, 0.57, 0.56], radius = 0.2 }
+material = "soft"
+velocity = [-0.9, -0.2, 0.0]
+
+[[cracks]]
+disk = { centre = [0.33, 0.41, 0.48], normal = [0.2, 0.3, 1.0], radius = 0.13 }
+law = "frictionless"
+bodies = ["left"]
+
+[[cracks]]
+rectangle = { corner = [0.71, 0.25, 0.25], edges = [[0.0, 0.6, 0.0], [0.0, 0.0, 0.6]] }
+law = "cohesive"
+cohesive = { strength = [300.0, 200.0], energy = [1.0, 2.0] }
+
+[[cracks]]
+triangles = "surface.stl"
+scale = 0.001
+law = "friction"
+friction = 0.2
+
+[output]
+history = { every = 5 }
+particles = { every = 20 }
+tips = { every = 20 }
+checkpoint = { every = 20, keep = 5 }
+"""
+SURFACE = """solid crack
+facet normal 0 0 0
+outer loop
+vertex 40 447 40
+vertex 600 447 40
+vertex 600 457 900
+endloop
+endfacet
+facet normal 0 0 0
+outer loop
+vertex 40 447 40
+vertex 600 457 900
+vertex 40 457 900
+endloop
+endfacet
+endsolid crack
+"""
+DISK = 'disk = { centre = [0.33, 0.41, 0.48], normal = [0.2, 0.3, 1.0], radius = 0.13 }'
+ERRORS_3D = {
+    "": "needs one of",
+    "points = [[0.2, 0.3, 0.2], [0.4, 0.3, 0.2]]": "extrude: is missing",
+    "points = [[0.2, 0.3, 0.2], [0.4, 0.3, 0.2]]\nextrude = [1.0, 0.0, 0.0]": "is parallel to the line",
+    "rectangle = { corner = [0.7, 0.2, 0.2], edges = [[0.0, 0.6, 0.0], [0.0, 1.2, 0.0]] }": "not parallel",
+    "rectangle = { corner = [0.7, 0.2, 0.2], edges = [[0.0, 0.6, 0.0], [0.0, 0.0, 0.9]] }": "outside the domain",
+    "disk = { centre = [0.33, 0.41, 0.48], normal = [0.0, 0.0, 0.0], radius = 0.1 }": "must not be zero",
+    "disk = { centre = [0.1, 0.8, 0.1], normal = [0.0, 0.0, 1.0], radius = 0.1 }": "lies in no body",
+    'triangles = "nothing.stl"': "there is no file",
+    DISK + '\nends = ["tip", "tip"]': "is for 2D",
+    DISK + '\ngrowth = { criterion = "steady", speed = 1.0 }': 'must be "energy" or "hoop" in 3D',
+    DISK + '\ngrowth = { criterion = "energy", energy = 1.0, cohesive = true }': "is for growth in 2D",
+    DISK + '\nlaw = "cohesive"\ncohesive = { strength = 1e3, energy = 1.0, from = 0.1 }': "is for 2D",
+    DISK + "\n[crack]\nsplit = 10": "is for 2D",
+}
+
 
 def crack_rows(folder: Path, name: str) -> np.ndarray:
     with h5py.File(folder / name) as file:
@@ -180,9 +269,49 @@ def check_restart(cairn: Program, case: Path, scratch: Path) -> list[str]:
     return failures
 
 
-def check_errors(cairn: Program, plain: str, scratch: Path) -> list[str]:
+def check_balls(cairn: Program, scratch: Path) -> list[str]:
+    """Surfaces in 3D on several ranks, and from a checkpoint on another number."""
+    case = scratch / "balls.toml"
+    case.write_text(BALLS)
+    (scratch / "surface.stl").write_text(SURFACE)
     failures = []
-    for text, message in ERRORS.items():
+    for ranks in (1, 2, 3):
+        done = cairn("run", case, "--out", scratch / f"balls_{ranks}", ranks=ranks, timeout=300)
+        if done.code != 0:
+            return [f"balls on {ranks} ranks: exit code {done.code}: {done.err}"]
+        if ranks > 1:
+            different = differences(scratch / "balls_1", scratch / f"balls_{ranks}")
+            failures += [f"balls on {ranks} ranks: {line}" for line in different[:5]]
+    out = scratch / "balls_restarted"
+    done = cairn("run", case, "--out", out, "--restart", scratch / "balls_1" / "checkpoint_000000.h5", ranks=2,
+                 timeout=300)
+    if done.code != 0:
+        return [*failures, f"balls: restart: exit code {done.code}: {done.err}"]
+    for name in ("particles_000002.vtkhdf", "cracks_000002.h5", "tips_000002.h5"):
+        failures += [f"balls: restart: {name}: {line}"
+                     for line in compare_runs.compare_files(scratch / "balls_1" / name, out / name)]
+    again = cairn("check", scratch / "balls_1" / "case.toml")
+    if again.code != 0:
+        failures.append(f"balls: the case beside the results: {again.err}")
+    with h5py.File(scratch / "balls_1" / "cracks_000002.h5") as file:
+        corners, crack = file["VTKHDF/Connectivity"][:].reshape(-1, 3), file["crack"][:]
+        x = file["position"][:]
+        area = 0.5 * np.linalg.norm(np.cross(x[corners[:, 1]] - x[corners[:, 0]], x[corners[:, 2]] - x[corners[:, 0]]),
+                                    axis=1)
+        if not (crack[corners] == crack[corners[:, :1]]).all() or abs(area[crack[corners[:, 0]] == 0].sum() /
+                                                                    (np.pi * 0.13**2) - 1) > 0.05:
+            failures.append("the triangles of the round crack do not cover it")
+        if not np.linalg.norm(file["opening"][:], axis=1).max() > 1e-4:
+            failures.append("no crack of a ball opened or slipped")
+    with h5py.File(scratch / "balls_1" / "tips_000002.h5") as file:
+        if set(file["crack"][:]) != {0} or not np.isfinite(file["J"][:]).all() or len(file["index"][:]) < 20:
+            failures.append(f"rims: {file['crack'][:]}")
+    return failures
+
+
+def check_errors(cairn: Program, plain: str, scratch: Path, errors: dict) -> list[str]:
+    failures = []
+    for text, message in errors.items():
         case = scratch / "wrong.toml"
         case.write_text(plain + "\n[[cracks]]\n" + text + "\n")
         done = cairn("check", case)
@@ -200,7 +329,10 @@ def main() -> int:
     failures = failures or check_restart(cairn, case, scratch)
     case.write_text(plain + GROWING)
     failures += check_growth(cairn, case, scratch) or check_pictures(scratch / "growing_1")
-    failures += check_errors(cairn, plain, scratch)
+    failures += check_errors(cairn, plain, scratch, ERRORS)
+    failures += check_balls(cairn, scratch)
+    bare = BALLS[:BALLS.index("[[cracks]]")] + "[output]\nhistory = { every = 5 }\n"
+    failures += check_errors(cairn, bare, scratch, ERRORS_3D)
     for failure in failures:
         print(failure)
     print("FAILED" if failures else "passed")

@@ -10,8 +10,9 @@ namespace {
 
 using namespace test;
 
-std::map<std::pair<int, int>, CrackPoint<2>> crack_points_of(const Simulation<2>& simulation) {
-  std::map<std::pair<int, int>, CrackPoint<2>> all;
+template <int Dim>
+std::map<std::pair<int, int>, CrackPoint<Dim>> crack_points_of(const Simulation<Dim>& simulation) {
+  std::map<std::pair<int, int>, CrackPoint<Dim>> all;
   for (const auto& patch : simulation.patches())
     for (const auto& point : patch.cracks)
       if (point.own && !all.emplace(std::pair(point.crack, point.index), point).second)
@@ -19,14 +20,20 @@ std::map<std::pair<int, int>, CrackPoint<2>> crack_points_of(const Simulation<2>
   return all;
 }
 
+template <int Dim = 2>
 void check_cracks(Case c, int steps, bool grows = false) {
   int rank = 0;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   c.parallel.balance_every = 10, c.parallel.imbalance = 1.01;
   for (Partition partition : {Partition::metis, Partition::round_robin}) {
     c.parallel.partition = partition;
-    Simulation<2> shared(c, MPI_COMM_WORLD), alone(c, MPI_COMM_SELF);
-    const auto v = [](const Vec<2>& x) -> Vec<2> { return {x.y() > 0.5 ? 0.3 : -0.2, x.x() > 0.45 ? -0.1 : 0.2}; };
+    Simulation<Dim> shared(c, MPI_COMM_WORLD), alone(c, MPI_COMM_SELF);
+    const auto v = [](const Vec<Dim>& x) -> Vec<Dim> {
+      Vec<Dim> v = Vec<Dim>::Zero();
+      v.template head<2>() << (x.y() > 0.5 ? 0.3 : -0.2), (x.x() > 0.45 ? -0.1 : 0.2);
+      if (Dim == 3) v[Dim - 1] = x[Dim - 1] > 0.52 ? 0.1 : 0.0;
+      return v;
+    };
     set_velocities(shared, v), set_velocities(alone, v);
     const Totals start = shared.totals();
     const auto at_first = crack_points_of(alone);
@@ -37,7 +44,7 @@ void check_cracks(Case c, int steps, bool grows = false) {
       ASSERT_EQ(a.x, all.at(id).x);
       ASSERT_EQ(a.v, all.at(id).v);
       ASSERT_EQ(a.body, all.at(id).body);
-      for (int i = 0; i < symmetric_size<2>; ++i) ASSERT_EQ(a.stress.c[i], all.at(id).stress.c[i]);
+      for (int i = 0; i < symmetric_size<Dim>; ++i) ASSERT_EQ(a.stress.c[i], all.at(id).stress.c[i]);
     }
     const auto cracks = crack_points_of(alone), mine = crack_points_of(shared);
     double moved = 0;
@@ -114,6 +121,36 @@ TEST(CracksOnRanks, OtherStressUpdates) {
     c.solver.stress_update = update;
     check_cracks(c, 60);
   }
+}
+
+TEST(CracksOnRanks3D, ABodyInEightParts) {
+  Case c = block_at_rest_3d();
+  add_planes(c, CrackLaw::friction);
+  check_cracks<3>(c, 40);
+}
+TEST(CracksOnRanks3D, DisksAcrossPeriodicBoundaries) {
+  Case c = block_at_rest_3d();
+  c.domain.periodic = {true, false, true};
+  add_disk(c, Vec3(0.5, 0.47, 0.52), Vec3(0.3, 1, -0.2), 0.21, CrackLaw::friction);
+  add_disk(c, Vec3(0.43, 0.52, 0.5), Vec3(1, 0.1, 0.2), 0.3, CrackLaw::free);
+  c.bodies[0].velocity = Vec3(5, 0, 3);
+  check_cracks<3>(c, 40);
+}
+TEST(CracksOnRanks3D, AGrowingRim) {
+  Case c = block_at_rest_3d();
+  add_disk(c, Vec3(0.5, 0.49, 0.51), Vec3(0.1, 1, 0.2), 0.15, CrackLaw::friction);
+  GrowthSpec& growth = c.cracks[0].growth;
+  growth.criterion = GrowthCriterion::energy, growth.energy = 0.05;
+  check_cracks<3>(c, 40, true);
+}
+TEST(CracksOnRanks3D, Laws) {
+  Case c = block_at_rest_3d();
+  add_sheets(c, crossing_cracks(), CrackLaw::interface);
+  for (CrackSpec& crack : c.cracks) crack.interface.opening = 1e6, crack.interface.sliding = 3e5;
+  add_disk(c, Vec3(0.5, 0.5, 0.51), Vec3(0, 0, 1), 0.3, CrackLaw::cohesive);
+  c.cracks.back().cohesive.strength = {300, 200}, c.cracks.back().cohesive.energy = {1, 2};
+  c.cracks.back().cohesive.exponent = 1;
+  check_cracks<3>(c, 40);
 }
 
 }  // namespace

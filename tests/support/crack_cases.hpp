@@ -1,8 +1,6 @@
 #pragma once
 /// Cases with cracks, for tests.
 
-#include <functional>
-
 #include "cairn/core/error.hpp"
 #include "cases.hpp"
 
@@ -61,20 +59,53 @@ inline std::vector<Line> star_cracks(int count) {
   return lines;
 }
 
-inline std::map<std::int64_t, SolverPoint<2>> run(const Case& c, int steps) {
-  Simulation<2> simulation(c, MPI_COMM_SELF);
+/// A line drawn out, in 3D.
+inline void add_sheet(Case& c, const Line& points, const Vec3& extrude, CrackLaw law, double friction = 0.3) {
+  add_crack(c, points, law, friction);
+  c.cracks.back().extrude = extrude;
+}
+inline void add_disk(Case& c, const Vec3& centre, const Vec3& normal, double radius, CrackLaw law) {
+  add_crack(c, {}, law);
+  c.cracks.back().disk = CrackDisk{centre, normal, radius};
+}
+/// The cracks of 2D, drawn out through the whole depth.
+inline void add_sheets(Case& c, const std::vector<Line>& lines, CrackLaw law, double friction = 0.3) {
+  for (Line line : lines) {
+    for (Vec3& x : line) x.z() = 0.15;
+    add_sheet(c, line, Vec3(0, 0, 0.7), law, friction);
+  }
+}
+/// A block of 8 cells in a cube of 12, patches of 6 cells.
+inline Case block_at_rest_3d() {
+  Case c = soft_case(3, 12, 6);
+  add_body(c, BoxShape{Vec3(1.0 / 6, 1.0 / 6, 1.0 / 6), Vec3(5.0 / 6, 5.0 / 6, 5.0 / 6)});
+  return c;
+}
+/// Three planes through the middle.
+inline void add_planes(Case& c, CrackLaw law) {
+  add_sheet(c, {Vec3(0.1, 0.5, 0.1), Vec3(0.9, 0.5, 0.1)}, Vec3(0, 0, 0.8), law);
+  add_sheet(c, {Vec3(0.5, 0.1, 0.1), Vec3(0.5, 0.9, 0.1)}, Vec3(0, 0, 0.8), law);
+  add_sheet(c, {Vec3(0.1, 0.1, 0.5), Vec3(0.9, 0.1, 0.5)}, Vec3(0, 0.8, 0), law);
+}
+
+template <int Dim = 2>
+std::map<std::int64_t, SolverPoint<Dim>> run(const Case& c, int steps) {
+  Simulation<Dim> simulation(c, MPI_COMM_SELF);
   for (int i = 0; i < steps; ++i) simulation.step(1e300);
   return points_of(simulation);
 }
 
 /// Sets the points' velocities from their positions.
-inline void set_velocities(Simulation<2>& simulation, const std::function<Vec<2>(const Vec<2>&)>& velocity) {
-  using C = PointColumns<2>;
+template <int Dim, class F>
+void set_velocities(Simulation<Dim>& simulation, F&& velocity) {
+  using C = PointColumns<Dim>;
   for (auto& patch : simulation.patches())
     for (auto& piece : patch.pieces)
       for (int p = 0; p < piece.points.size(); ++p) {
-        const Vec<2> v = velocity(Vec<2>(piece.points.column(0)[p], piece.points.column(1)[p]));
-        for (int d = 0; d < 2; ++d) piece.points.column(C::velocity + d)[p] = v[d];
+        Vec<Dim> x;
+        for (int d = 0; d < Dim; ++d) x[d] = piece.points.column(d)[p];
+        const Vec<Dim> v = velocity(x);
+        for (int d = 0; d < Dim; ++d) piece.points.column(C::velocity + d)[p] = v[d];
       }
 }
 

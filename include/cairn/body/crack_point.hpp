@@ -1,5 +1,6 @@
 #pragma once
-/// Explicit cracks as patches hold them: a polyline of crack points (Nairn 2013; docs/cracks.md). 2D.
+/// Explicit cracks as patches hold them: crack points, the corners of a polyline in 2D and of triangles in 3D (Nairn
+/// 2013; Guo & Nairn, CMES 16, 2006; docs/cracks.md).
 
 #include <array>
 #include <cstdint>
@@ -13,19 +14,43 @@ namespace cairn {
 struct Bond {
   enum State : std::int32_t { none, holds, broken };
   State state = none;
-  double length = 0;                    // of the crack that the point stands for [m]
+  double length = 0;                    // of the crack that the point stands for [m]; in 3D its area [m2]
   std::array<double, 2> peak = {0, 0};  // largest opening and slip so far [m]
   double dissipated = 0;                // where it is broken [J/m2]
 };
 
-/// A point of a crack. The plane lies between the two faces, which begin in one place and move with the material on
-/// their sides. Upper is left of the crack's direction, that of ascending index.
+/// What an edge of a crack's triangle is: between two of them, or of its rim, at or beyond a body's surface or inside.
+enum class CrackEdge : std::int32_t { inner, open, tip };
+
+/// A triangle of a crack, held by one of its corners. Seen from above its corners go round to the left.
+struct CrackTriangle {
+  std::int32_t second = 0, third = 0;  // indices of the other corners
+  std::int32_t edges = 0;              // two bits for each: from the first corner, from the second, from the third
+
+  CrackEdge edge(int k) const { return CrackEdge{edges >> 2 * k & 3}; }
+  void set_edge(int k, CrackEdge kind) { edges |= static_cast<std::int32_t>(kind) << 2 * k; }
+};
+
+/// What crack points know of those around them, beside the next one along the line: in 3D triangles.
 template <int Dim>
-struct CrackPoint {
+struct CrackHeld {};
+template <>
+struct CrackHeld<3> {
+  static constexpr int most = 6;  // a point holds two on average, as triangles go to those corners that hold the fewest
+  std::array<CrackTriangle, most> triangles{};
+  std::int32_t held = 0;
+  bool tip = false;  // an edge of the rim inside a body ends here
+};
+
+/// A point of a crack. The plane lies between the two faces, which begin in one place and move with the material on
+/// their sides. Upper is left of the crack's direction, that of ascending index; in 3D where triangles turn to the
+/// left.
+template <int Dim>
+struct CrackPoint : CrackHeld<Dim> {
   static constexpr std::int32_t index_step = 1024;  // between neighbours at the start: room for those that come between
 
   std::int32_t crack = 0, index = 0;  // index along the crack, kept for life
-  std::int32_t next = 0;              // index of the point that follows; its own at the last one
+  std::int32_t next = 0;              // index of the point that follows; its own at the last one, and in 3D
   bool own = true;                    // of the patch that holds it; else a copy of a neighbour's
   bool filled = true;                 // material lay beside it in the last step
   int faces_filled = 3;               // and beside which face: 1 below, 2 above

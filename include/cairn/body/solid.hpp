@@ -33,6 +33,10 @@ struct SurfaceFaults {
 /// within nothing.
 SurfaceFaults mend(Triangles& surface);
 
+/// As mend, for a surface that need not enclose anything: no part is turned as a whole, and crossings are not looked
+/// for.
+SurfaceFaults mend_sheet(Triangles& surface);
+
 /// The number of pairs of triangles that pass through each other, and where the first does.
 std::int64_t count_crossings(const Triangles& surface, Vec3& where);
 

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "cairn/core/types.hpp"
+#include "cairn/body/solid.hpp"
 
 namespace cairn {
 
@@ -49,8 +50,26 @@ struct GrowthSpec {
   bool cohesive = false;                                  // the new segment has the crack's cohesive law
 };
 
+/// A plane, round crack; the normal points to what is above.
+struct CrackDisk {
+  Vec3 centre = Vec3::Zero(), normal = Vec3::UnitZ();
+  double radius = 0;  // [m]
+};
+/// A crack in the form of a surface from a file.
+struct CrackFile {
+  std::string name;     // as the case file has it
+  double scale = 1;     // metres in a unit of the file
+  Triangles triangles;  // [m]; points that several share are one, and neighbours agree on what is above
+};
+
 struct CrackSpec {
   std::vector<Vec3> points;  // [m], in the crack's direction
+  // In 3D one of: `points` drawn out along `extrude` [m], so that extrude x direction points to what is above; a disk;
+  // a file.
+  Vec3 extrude = Vec3::Zero();
+  std::optional<CrackDisk> disk;
+  std::optional<CrackFile> file;
+  // In 3D the rim is sorted by the bodies' shapes; the last end stands for it, and is a tip where some of it is.
   std::array<CrackEnd, 2> ends = {CrackEnd::open, CrackEnd::open};
   CrackLaw law = CrackLaw::friction;
   double friction = 0.3;
@@ -61,6 +80,7 @@ struct CrackSpec {
   std::vector<int> ids;             // or those bodies; both empty: all that are not rigid
   std::string source;               // where it was defined, for messages
 
+  bool is_surface() const { return disk || file || !extrude.isZero(0); }
   bool has_tractions() const { return law == CrackLaw::interface || law == CrackLaw::cohesive || growth.cohesive; }
   bool cuts_all() const { return groups.empty() && ids.empty(); }  // that are not rigid
   bool cuts(int body, const std::string& group) const {

@@ -1,5 +1,5 @@
 #pragma once
-/// The sides of cracks on which nodes lie, as the points around them see it: which velocity fields there are. 2D.
+/// The sides of cracks on which nodes lie, as the points around them see it: which velocity fields there are.
 
 #include <span>
 
@@ -35,14 +35,31 @@ struct Crack {
   }
 };
 
-/// The segments of cracks within reach of a patch, by the cells they can matter to.
+/// Whether a crack ends at a point, inside a body.
+template <int Dim>
+bool is_tip(const Crack& crack, const CrackPoint<Dim>& point) {
+  if constexpr (Dim == 3)
+    return point.tip;
+  else
+    return crack.is_tip(point.index);
+}
+
+/// The segments of cracks within reach of a patch, in 3D triangles, by the cells they can matter to.
 template <int Dim>
 class CrackSegments {
  public:
   struct Segment {
     int crack;
-    Vec<Dim> a, b;
+    std::array<Vec<Dim>, Dim> corners;
     Vec<Dim> normal;  // from below to above
+    double distance_to(const Vec<Dim>& x) const;
+  };
+  /// Of a crack point in 3D: the mean of its triangles', weighted by their areas.
+  struct PointNormal {
+    std::int32_t crack;
+    Image image;
+    std::int32_t index;
+    Vec<Dim> normal;
   };
   /// What the line from a point to a node crosses.
   struct Crossings {
@@ -64,11 +81,14 @@ class CrackSegments {
   /// How far along the line from x to y it meets a segment of another crack, or one of its own that is not among the
   /// last `skipped` before x; as a share of the line, infinite where it meets none.
   double first_meeting(const Vec<Dim>& x, const Vec<Dim>& y, int crack, double skipped) const;
-  /// The unit normal of crack c nearest to x; zero where it has no segment here.
-  Vec<Dim> normal_near(int c, const Vec<Dim>& x) const;
+  /// The crack's unit normal at one of its points; zero where it has no segment here.
+  Vec<Dim> normal_at(const CrackPoint<Dim>& point) const;
 
  private:
-  std::vector<Segment> segments_;  // ascending in (crack, place along it)
+  Vec<Dim> normal_near(int c, const Vec<Dim>& x) const;
+
+  std::vector<Segment> segments_;     // ascending in (crack, place along it)
+  std::vector<PointNormal> normals_;  // ascending in (crack, image, index); 3D
   Box<Dim> cells_;
   std::vector<int> first_, listed_;  // for each cell, where its segments begin in `listed_`
 };

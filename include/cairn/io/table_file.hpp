@@ -50,14 +50,21 @@ struct Column {
       values;
 };
 
-/// Writes point data as a VTKHDF 1.0 unstructured grid of vertices that ParaView opens as it is. The file is written
+/// Triangles over the rows of a table: this rank's rows of them, and the rows of their corners, three for each.
+struct TriangleCells {
+  RowBlocks rows;
+  std::span<const std::int64_t> corners;
+};
+
+/// Writes point data as a VTKHDF 1.0 unstructured grid of vertices, or of the triangles that are given, that ParaView
+/// opens as it is. The file is written
 /// under a temporary name and renamed when whole. Collective.
 /// `columns` must hold "position" (components 3, double); it becomes the grid's points and is not repeated as point
 /// data. `kind` says in words what the rows are. \throws RunError with the system's message when writing fails (on
 /// every rank).
 void write_vtkhdf(const std::filesystem::path& file, MPI_Comm comm, const RowBlocks& rows,
                   std::span<const Column> columns, double time, std::int64_t step,
-                  const std::string& kind = "material points");
+                  const std::string& kind = "material points", const TriangleCells* triangles = nullptr);
 
 /// Writes a plain table: one dataset at the root for each column. Otherwise as write_vtkhdf. Collective.
 /// \throws RunError with the system's message when writing fails (on every rank).

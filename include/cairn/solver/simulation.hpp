@@ -77,11 +77,13 @@ template <int Dim>
 std::array<double, 6> stress_of_points(const Piece<Dim>& piece, double density);
 
 /// A crack's tip and what drives it.
+template <int Dim>
 struct TipState {
-  CrackTip tip;
+  CrackTip<Dim> tip;
   double J = 0, J_static = 0;           // with the terms of motion, and without [J/m2]
   double K_opening = 0, K_sliding = 0;  // [Pa m^1/2]; NaN where the law is not linear
   double length = 0;                    // by which it grew [m]
+  double K_tearing = 0;                 // in 3D
 };
 
 class Checkpoint;
@@ -192,9 +194,9 @@ class Simulation {
   /// after a step that failed.
   void project_stress();
 
-  /// The tips of cracks, ascending in (crack, end), the same on every rank. The nodes are projected anew. Collective;
-  /// not after a step that failed.
-  std::vector<TipState> tip_states();
+  /// The tips of cracks, in 3D the points of their rims, ascending in (crack, end), the same on every rank. The nodes
+  /// are projected anew. Collective; not after a step that failed.
+  std::vector<TipState<Dim>> tip_states();
 
   /// Energies, momentum and ledger. Collective; the result is valid on rank 0.
   Totals totals() const;
@@ -341,12 +343,17 @@ class Simulation {
   std::vector<Advance> find_advances();
   void meet_obstacles(std::vector<Advance>& advances);
   void advance(const Advance& to);
+  // solver/rim_growth.cpp
+  void grow_rims();
+  std::vector<bool> find_material(const std::vector<int>& cracks, const std::vector<Vec<Dim>>& places);
   void follow_openings();
   // solver/tips.cpp
-  std::vector<CrackTip> find_tips() const;
+  std::vector<CrackTip<Dim>> own_tips(const Patch<Dim>& patch) const;
+  std::vector<CrackTip<Dim>> find_tips() const;
   double find_motion();
-  void add_face_terms(std::size_t p, const std::vector<CrackTip>& tips, double dt, std::vector<TipSums>& sums) const;
-  void add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip>& tips, std::vector<TipSums>& sums) const;
+  void add_face_terms(std::size_t p, const std::vector<CrackTip<Dim>>& tips, double dt,
+                      std::vector<TipSums>& sums) const;
+  void add_tip_terms(const Patch<Dim>& patch, const std::vector<CrackTip<Dim>>& tips, std::vector<TipSums>& sums) const;
   CrackSegments<Dim>& segments_of(const Patch<Dim>& patch) { return segments_[&patch - patches_.data()]; }
   CrackSurroundings<Dim> surroundings_of(const Patch<Dim>& patch) {
     return {patch, lattice_, segments_of(patch), cracks_, crack_densities_, solver_.stress_update};

@@ -1,0 +1,177 @@
+// Bodies that explicit cracks cut in 3D, through whole steps.
+
+#include <gtest/gtest.h>
+#include <mpi.h>
+
+#include <Eigen/Geometry>
+
+#include "../support/crack_cases.hpp"
+#include "../support/mpi_environment.hpp"
+
+namespace cairn {
+namespace {
+
+using namespace test;
+
+Case falling_block_3d() {
+  Case c = block_at_rest_3d();
+  c.domain.gravity = Vec3(0.3, -1, 0.2);
+  c.bodies[0].angular_velocity = Vec3(0.3, -0.2, 0.5), c.bodies[0].velocity = Vec3(0.1, 0.05, -0.02);
+  return c;
+}
+
+TEST(Cracks3D, StickingCracksAreNotThere) {
+  Case whole = falling_block_3d();
+  whole.solver.noise_filter = NoiseFilter::off;  // it sees the fields of the sides, sticking or not
+  const auto without = run<3>(whole, 60);
+  double largest = 0;
+  for (const auto& [id, a] : without) largest = std::max(largest, a.v.norm());
+  std::vector<Case> cases(4, whole);
+  add_planes(cases[0], CrackLaw::stick);  // on grid planes, crossing
+  Line wave;
+  for (int i = 0; i <= 16; ++i) wave.push_back(Vec3(0.1 + 0.05 * i, 0.5031 + 0.05 * std::sin(i), 0.1));
+  add_sheet(cases[1], wave, Vec3(0.05, 0, 0.8), CrackLaw::stick);
+  add_disk(cases[2], Vec3(0.5, 0.47, 0.52), Vec3(0.3, 1, -0.2), 0.21, CrackLaw::stick);
+  add_disk(cases[3], Vec3(0.5, 0.5, 0.5), Vec3(0, 0, 1), 0.25, CrackLaw::stick);  // on a grid plane
+  add_disk(cases[3], Vec3(0.5, 0.5, 0.5), Vec3(1, 0, 1), 0.25, CrackLaw::stick);  // ties along diagonals
+  for (std::size_t k = 0; k < cases.size(); ++k)
+    for (const auto& [id, b] : run<3>(cases[k], 60))
+      ASSERT_LE((b.v - without.at(id).v).norm(), 1e-12 * largest) << "case " << k << " point " << id;
+}
+
+/// Frictionless cracks let go: thrown apart, every part keeps its velocity.
+TEST(Cracks3D, PartsThrownApartKeepTheirVelocity) {
+  std::vector<Case> cases(4, block_at_rest_3d());
+  for (int n = 1; n <= 3; ++n) add_sheets(cases[n - 1], star_cracks(n), CrackLaw::frictionless);
+  add_planes(cases[3], CrackLaw::frictionless);
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.cracks.size());
+    Simulation<3> simulation(c, MPI_COMM_SELF);
+    set_velocities(simulation, [&](const Vec<3>& x) -> Vec<3> {  // the same for a whole sector
+      Vec<3> v = Vec<3>::Zero();
+      for (const CrackSpec& crack : c.cracks) {
+        const Vec3 n = crack.extrude.cross(crack.points[1] - crack.points[0]).normalized();
+        v += ((x - crack.points[0]).dot(n) > 0 ? 0.1 : -0.1) * n;
+      }
+      return v;
+    });
+    const auto before = points_of(simulation);
+    for (int i = 0; i < 20; ++i) simulation.step(1e300);
+    for (const auto& [id, a] : points_of(simulation)) ASSERT_LE((a.v - before.at(id).v).norm(), 1e-13) << id;
+    double opened = 0;
+    for (const auto& patch : simulation.patches())
+      for (const auto& point : patch.cracks)
+        if (point.own) opened = std::max(opened, point.opening().norm());
+    EXPECT_GT(opened, 0.19 * simulation.time());
+  }
+}
+
+/// Thrown together, parts hit each other across cracks; momentum stays, and no energy is made.
+TEST(Cracks3D, PartsThrownTogetherMakeNoEnergy) {
+  for (const double friction : {0.0, 0.3, 1e300}) {
+    Case c = block_at_rest_3d();
+    add_sheets(c, star_cracks(2), CrackLaw::friction, friction);
+    Simulation<3> simulation(c, MPI_COMM_SELF);
+    set_velocities(simulation, [](const Vec<3>& x) -> Vec<3> {
+      return {x.x() > 0.5 ? -0.2 : 0.2, x.y() > 0.5 ? -0.1 : 0.15, x.y() > 0.5 ? 0.05 : 0.0};
+    });
+    const Totals start = simulation.totals();
+    for (int i = 0; i < 120; ++i) {
+      simulation.step(1e300);
+      if (i % 10) continue;
+      const Totals now = simulation.totals();
+      ASSERT_LE(now.kinetic + now.strain, 1.005 * start.kinetic) << "friction " << friction << " step " << i;
+      ASSERT_LE((now.momentum - start.momentum).norm(), 1e-13 * start.mass * 0.3);
+      ASSERT_NEAR(now.energy(), start.energy(), 0.01 * start.kinetic) << "friction " << friction << " step " << i;
+    }
+    EXPECT_LT(simulation.totals().kinetic, 0.999 * start.kinetic) << "the parts did not meet";
+  }
+}
+
+/// A bar of 4 by 4 cells, 4 long, 20 cells a unit.
+Case long_bar_3d() {
+  Case c = soft_case(3, 20, 10);
+  c.domain.upper = Vec3(4, 0.5, 0.5), c.domain.cells = {80, 10, 10};
+  add_body(c, BoxShape{Vec3(0.1, 0.15, 0.15), Vec3(3.9, 0.35, 0.35)});
+  return c;
+}
+
+/// A closed crack lets compression pass and no tension.
+TEST(Cracks3D, TensionDoesNotPassACrackAndCompressionDoes) {
+  for (const double sign : {-1.0, 1.0}) {
+    Case whole = long_bar_3d(), c = long_bar_3d();
+    add_sheet(c, {Vec3(2.013, 0.12, 0.12), Vec3(2.013, 0.38, 0.12)}, Vec3(0, 0, 0.26), CrackLaw::friction);
+    Simulation<3> cut(c, MPI_COMM_SELF), bar(whole, MPI_COMM_SELF);
+    const double v0 = 1e-3;
+    for (auto* simulation : {&cut, &bar})
+      set_velocities(*simulation, [&](const Vec<3>& x) -> Vec<3> { return {x.x() < 1 ? sign * v0 : 0, 0, 0}; });
+    const double c0 = std::sqrt(cut.materials()[0].longitudinal_modulus / 1000);
+    while (cut.time() < 1.6 / c0) cut.step(1e300), bar.step(1e300);  // past the crack, not at the end
+    double behind = 0, difference = 0, reference = 0;
+    const auto of_bar = points_of(bar);
+    for (const auto& [id, a] : points_of(cut)) {
+      if (a.x.x() > 2.02) behind = std::max(behind, a.v.norm());
+      difference = std::max(difference, (a.v - of_bar.at(id).v).norm());
+      if (of_bar.at(id).x.x() > 2.02) reference = std::max(reference, of_bar.at(id).v.norm());
+    }
+    ASSERT_GT(reference, 0.4 * v0) << "the wave is not there yet";
+    std::printf("%s: behind the crack %.3g v0, off the bar without one %.3g v0\n", sign > 0 ? "pressed" : "pulled",
+                behind / v0, difference / v0);
+    if (sign > 0)
+      EXPECT_LE(difference, 0.02 * v0);
+    else
+      EXPECT_LE(behind, 1e-6 * v0);
+  }
+}
+
+/// A block on a crack plane of 30 degrees slides with x = g (sin - mu cos) t^2/2, and friction takes mu m g cos x.
+TEST(Cracks3D, ABlockSlidesAlongACrack) {
+  Case c = soft_case(3, 60, 10);
+  c.domain.upper = Vec3(3, 1.2, 0.7), c.domain.cells = {30, 12, 7};
+  c.domain.gravity = Vec3(10 * Vec3(0.5, -std::sqrt(0.75), 0));
+  c.materials[0].parameters = {{"shear_modulus", 1.2e7}, {"bulk_modulus", 2.4e7}};
+  c.faces[2].type = FaceType::fixed;
+  const Shape base = BoxShape{Vec3(0.3, 0, 0.1), Vec3(2.4, 0.3, 0.6)},
+              block = BoxShape{Vec3(0.6, 0.3, 0.2), Vec3(1.4, 0.7, 0.5)};
+  add_body(c, Compound{CompoundOperation::union_of, {base, block}});
+  add_sheet(c, {Vec3(0.2, 0.3, 0.05), Vec3(2.6, 0.3, 0.05)}, Vec3(0, 0, 0.6), CrackLaw::friction, 0.3);
+  Simulation<3> simulation(c, MPI_COMM_SELF);
+  const auto start = points_of(simulation);
+  const Totals before = simulation.totals();
+  while (simulation.time() < 0.6) simulation.step(0.6 - simulation.time());
+  double mass = 0, x = 0, v = 0;
+  for (const auto& [id, a] : points_of(simulation)) {
+    if (start.at(id).x.y() < 0.3) continue;
+    mass += a.mass, x += a.mass * (a.x.x() - start.at(id).x.x()), v += a.mass * a.v.x();
+  }
+  x /= mass, v /= mass;
+  const double a = 10 * (0.5 - 0.3 * std::sqrt(0.75)), friction = 0.3 * mass * 10 * std::sqrt(0.75) * 0.5 * a * 0.36;
+  const Totals after = simulation.totals();
+  const double taken = after.contact_dissipation - before.contact_dissipation;
+  std::printf("x %.4f, v %.4f, friction %.4f of the exact ones\n", x / (0.5 * a * 0.36), v / (a * 0.6),
+              taken / friction);
+  EXPECT_NEAR(x / (0.5 * a * 0.36), 1, 0.03);
+  EXPECT_NEAR(v / (a * 0.6), 1, 0.02);
+  EXPECT_NEAR(taken / friction, 1, 0.04);
+  EXPECT_NEAR(after.energy(), before.energy(), 0.01 * friction);
+  for (const auto& patch : simulation.patches())
+    for (const auto& point : patch.cracks)
+      if (point.own && point.plane.x() > 0.6 + x && point.plane.x() < 1.4 + x &&
+          std::abs(point.plane.z() - 0.35) < 0.15) {
+        EXPECT_GT(point.opening().y(), -0.01 * 0.1) << "faces went through each other at " << point.plane.transpose();
+      }
+}
+
+TEST(Cracks3D, ACrackAlongPointsIsAnError) {
+  Case c = block_at_rest_3d();
+  add_disk(c, Vec3(0.5, 0.5 + 1.0 / 48, 0.5), Vec3(0, 1, 0), 0.3, CrackLaw::friction);
+  try {
+    Simulation<3> simulation(c, MPI_COMM_SELF);
+    FAIL() << "was accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("goes along material points"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace cairn
