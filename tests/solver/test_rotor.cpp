@@ -20,7 +20,7 @@ template <int Dim>
 Case wheel_case() {
   const double z = Dim == 3 ? 1 : 0;
   Case c = soft_case(Dim, Dim == 2 ? 20 : 12, 4);
-  c.materials.push_back({"stiff", "rigid", 0, {}});
+  c.materials.push_back({"stiff", "rigid", 1000, {}});
   add_body(c, BoxShape{Vec3(0.2, 0.45, 0.2 * z), Vec3(0.8, 0.55, 0.8 * z)});
   c.bodies[0].material = 1;
   add_body(c, Ball{Vec3(0.7, 0.8, 0.5 * z), 0.15}, Vec3(0.1, -1, 0));
