@@ -1,6 +1,8 @@
 // Nodes with fields of several sides of cracks: which of them meet, as bodies and across cracks (Nairn 2013, section
 // 2).
 
+#include <numeric>
+
 #include "cairn/contact/crack_gap.hpp"
 #include "cairn/contact/sweep.hpp"
 #include "node_access.hpp"
@@ -125,6 +127,34 @@ void ContactSweep<Dim>::add_crack_pairs(const Node& node, const Patch<Dim>& patc
         pairs_.push_back(pair);
       }
     }
+  bind_far_fields(node, settings);
+}
+
+/// Fields that only cracks which bind part are one, even where the fields between them have no material: those that no
+/// chain of pairs connects yet are bound.
+template <int Dim>
+void ContactSweep<Dim>::bind_far_fields(const Node& node, const ContactSettings<Dim>& settings) {
+  const ContactEntry<Dim>* entry = &entries_[node.first];
+  const auto binds = [&](int c) { return settings.cracks[c].meets && settings.cracks[c].law.binds(); };
+  std::vector<int> group(node.count);
+  std::iota(group.begin(), group.end(), 0);
+  const auto join = [&](int a, int b) { std::ranges::replace(group, int{group[a]}, int{group[b]}); };
+  for (int p = node.first_pair; p < static_cast<int>(pairs_.size()); ++p)
+    if (pairs_[p].crack != NodePair<Dim>::none && binds(pairs_[p].crack)) join(pairs_[p].a, pairs_[p].b);
+  for (int i = 0; i < node.count; ++i)
+    for (int j = i + 1; j < node.count; ++j) {
+      const SideSet first = entry[i].sides, second = entry[j].sides;
+      const auto parts = [&](int c) { return first.contains(c) != second.contains(c); };
+      if (group[i] == group[j] || entry[i].piece != entry[j].piece) continue;
+      if (!(first.only([&](int c) { return parts(c) && !binds(c); }).empty()) ||
+          !(second.only([&](int c) { return parts(c) && !binds(c); }).empty()))
+        continue;
+      NodePair<Dim> pair;
+      pair.a = i, pair.b = j, pair.open = true, pair.normal.setZero();
+      pair.crack = first.only(parts).empty() ? second.only(parts).crack(0) : first.only(parts).crack(0);
+      pair.law = settings.cracks[pair.crack].law;
+      pairs_.push_back(pair), join(i, j);
+    }
 }
 
 /// Faces of a crack are held where they would be pressed together by the end of the step and have met by then.
@@ -152,7 +182,11 @@ void ContactSweep<Dim>::solve_for_least() {
     // taken for round-off of another.
     const Eigen::VectorXd size = whole.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     whole = (size.asDiagonal() * whole * size.asDiagonal()).eval();
-    right_ = size.asDiagonal() * whole.completeOrthogonalDecomposition().solve(size.asDiagonal() * right_).eval();
+    const auto factors = whole.completeOrthogonalDecomposition();
+    const Eigen::VectorXd right = size.asDiagonal() * right_;
+    Eigen::VectorXd solution = factors.solve(right);
+    solution += factors.solve(right - whole * solution);
+    right_ = size.asDiagonal() * solution;
     return;
   }
   right_ = whole.completeOrthogonalDecomposition().solve(right_).eval();

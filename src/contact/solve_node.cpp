@@ -135,6 +135,9 @@ std::vector<Vec<Dim>> ContactSweep<Dim>::bound_directions(const NodePair<Dim>& p
     for (int d = 0; d < Dim; ++d) directions.push_back(Vec<Dim>::Unit(d));
   } else if constexpr (Dim == 2) {
     directions.push_back(Vec<2>(-pair.normal.y(), pair.normal.x()));
+  } else {
+    directions.push_back(pair.normal.unitOrthogonal());
+    directions.push_back(pair.normal.cross(directions[0]));
   }
   return directions;
 }

@@ -23,6 +23,15 @@ void add_determinant(ExactSum<Most>& sum, const Vec<3>& a, const Vec<3>& b, cons
   }
 }
 
+/// Whether a - b, which rounds to x, is x.
+bool is_difference(double a, double b, double x) {
+  const double virtual_b = a - x, virtual_a = x + virtual_b;
+  return (a - virtual_a) + (virtual_b - b) == 0;
+}
+bool is_difference(const Vec<3>& a, const Vec<3>& b, const Vec<3>& x) {
+  return is_difference(a[0], b[0], x[0]) && is_difference(a[1], b[1], x[1]) && is_difference(a[2], b[2], x[2]);
+}
+
 }  // namespace
 
 int orientation(const Vec<3>& a, const Vec<3>& b, const Vec<3>& c, const Vec<3>& d) {
@@ -35,6 +44,11 @@ int orientation(const Vec<3>& a, const Vec<3>& b, const Vec<3>& c, const Vec<3>&
   }
   constexpr double bound = 1e-15;  // Shewchuk's (7 + 56 u) u is 7.8e-16; here two additions more
   if (std::abs(det) > bound * size) return sign_of(det);
+  if (is_difference(b, a, u) && is_difference(c, a, v) && is_difference(d, a, w)) {  // as on grids
+    ExactSum<24> exact;
+    add_determinant(exact, u, v, w, 1);
+    return exact.sign();
+  }
   ExactSum<96> exact;
   add_determinant(exact, b, c, d, 1), add_determinant(exact, a, c, d, -1);
   add_determinant(exact, a, b, d, 1), add_determinant(exact, a, b, c, -1);

@@ -5,6 +5,8 @@
 #include <optional>
 #include <tuple>
 
+#include "triangles_around.hpp"
+
 namespace cairn {
 namespace {
 
@@ -72,14 +74,39 @@ RowState<Dim> state_of(const CrackSurroundings<Dim>& around, int crack, const In
   return state;
 }
 
+/// Segments that lines from a face to the nodes around it may cross: of the own crack from where it begins, of others.
+template <int Dim>
+class SegmentsSeen {
+ public:
+  SegmentsSeen(const CrackSurroundings<Dim>& around, int crack, const Vec<Dim>& face, const Vec<Dim>& start)
+      : own_(around.segments.near(start, around.lattice)), others_(around.segments.near(face, around.lattice)) {
+    if constexpr (Dim == 3) {
+      const Vec<Dim> reach = 1.51 * around.lattice.spacing();  // of the nodes nearest to the face
+      const Vec<Dim> further = reach + (start - face).cwiseAbs();
+      own_triangles_.emplace(around.segments, own_, start, further, [&](int c) { return c == crack; });
+      other_triangles_.emplace(around.segments, others_, face, reach, [&](int c) { return c != crack; });
+    }
+  }
+  std::span<const int> own(const Vec<Dim>& node) {
+    if constexpr (Dim == 3) return own_triangles_->towards(node);
+    return own_;
+  }
+  std::span<const int> others(const Vec<Dim>& node) {
+    if constexpr (Dim == 3) return other_triangles_->towards(node);
+    return others_;
+  }
+
+ private:
+  std::span<const int> own_, others_;
+  std::optional<TrianglesAround> own_triangles_, other_triangles_;
+};
+
 /// The cracks that the line from a face to a node crosses: the own one is left on the side's side.
 template <int Dim>
-SideSet sides_seen(const CrackSurroundings<Dim>& around, const CrackPoint<Dim>& point, const Vec<Dim>& face,
-                   const Vec<Dim>& start, const Vec<Dim>& node, int body) {
-  const auto near_start = around.segments.near(start, around.lattice),
-             near = around.segments.near(face, around.lattice);
-  const SideSet own = around.segments.crossed(near_start, start, node, body, around.cracks).sides;
-  const SideSet others = around.segments.crossed(near, face, node, body, around.cracks).sides;
+SideSet sides_seen(const CrackSurroundings<Dim>& around, SegmentsSeen<Dim>& segments, const CrackPoint<Dim>& point,
+                   const Vec<Dim>& face, const Vec<Dim>& start, const Vec<Dim>& node, int body) {
+  const SideSet own = around.segments.crossed(segments.own(node), start, node, body, around.cracks).sides;
+  const SideSet others = around.segments.crossed(segments.others(node), face, node, body, around.cracks).sides;
   std::vector<int> list;
   for (int k = 0; k < others.size(); ++k)
     if (others.crack(k) != point.crack) list.push_back(others.crack(k));
@@ -167,6 +194,7 @@ FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoin
   const Lattice<Dim>& lattice = around.lattice;
   const Vec<Dim> x = side > 0 ? point.upper : point.lower;
   const Vec<Dim> start = point.plane + side * aside * lattice.smallest_spacing() * normal;
+  SegmentsSeen<Dim> seen(around, point.crack, x, start);
   constexpr int size = 1 + Dim;
   using Square = Eigen::Matrix<double, size, size>;
   Square M = Square::Zero();
@@ -177,7 +205,7 @@ FaceRows<Dim> rows_of_face(const CrackSurroundings<Dim>& around, const CrackPoin
     return b;
   };
   for_nearest(lattice, x, [&](const Index<Dim>& place, const Vec<Dim>& node, double weight) {
-    const SideSet sides = sides_seen(around, point, x, start, node, body);
+    const SideSet sides = sides_seen(around, seen, point, x, start, node, body);
     const double fill = std::min(1.0, state_of<Dim>(around, point.crack, place, sides).fill / light);
     if (!(weight * fill > 0)) return;
     face.filled += weight * fill;

@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "cairn/core/lanes.hpp"
 #include "cairn/crack/crossing.hpp"
 #include "sheets.hpp"
+#include "triangles_around.hpp"
 
 namespace cairn {
 namespace {
@@ -38,13 +40,6 @@ bool are_apart(const Vec<Dim>& a, const Vec<Dim>& b, const std::array<Vec<Dim>, 
     if (std::max(a[k], b[k]) < lower || upper < std::min(a[k], b[k])) return true;
   }
   return false;
-}
-
-/// Whether both ends of a line lie on one side of a triangle's plane, beyond doubt: rounding errors are far smaller.
-bool on_one_side(const Vec<3>& x, const Vec<3>& node, const Vec<3>& corner, const Vec<3>& normal) {
-  const double from = normal.dot(x - corner), to = normal.dot(node - corner);
-  const double sure = 1e-6 * (node - x).cwiseAbs().maxCoeff();
-  return (from > sure && to > sure) || (from < -sure && to < -sure);
 }
 
 /// What the line from a point to a node crosses, by point.
@@ -129,10 +124,7 @@ auto CrackSegments<Dim>::crossed(std::span<const int> near, const Vec<Dim>& x, c
     Vec<Dim> normal = Vec<Dim>::Zero();
     for (; k < near.size() && segments_[near[k]].crack == crack; ++k) {
       const Segment& s = segments_[near[k]];
-      if (!cuts) continue;
-      if constexpr (Dim == 3)
-        if (on_one_side(x, node, s.corners[0], s.normal)) continue;
-      if (are_apart<Dim>(x, node, s.corners)) continue;
+      if (!cuts || are_apart<Dim>(x, node, s.corners)) continue;
       const int sign = crack::crossing(x, node, s.corners);
       if (sign != 0) sum += sign, normal += s.normal;
     }
@@ -218,15 +210,13 @@ int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std:
   for (int p = 0; p < piece.points.size(); ++p) {
     Vec<Dim> x;
     for (int d = 0; d < Dim; ++d) x[d] = piece.points.column(d)[p];
-    auto near = segments.near(x, lattice);
+    const auto near = segments.near(x, lattice);
     if (near.empty()) continue;
-    std::vector<int> reached;  // of many triangles few
+    std::optional<TrianglesAround> triangles;
     if constexpr (Dim == 3) {
-      const Vec<Dim> most = (point_reach + 1e-6) * lattice.spacing();
-      std::ranges::copy_if(near, std::back_inserter(reached),
-                           [&](int s) { return !are_apart<Dim>(x - most, x + most, segments.all()[s].corners); });
-      if (reached.empty()) continue;
-      near = reached;
+      const auto cuts = [&](int crack) { return cracks[crack].cuts(piece.body); };
+      triangles.emplace(segments, near, x, (point_reach + 1e-6) * lattice.spacing(), cuts);
+      if (triangles->empty()) continue;
     }
     Box<Dim> around;
     for (int d = 0; d < Dim; ++d) {
@@ -241,7 +231,9 @@ int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std:
         node[d] = lattice.node_position(d, place[d]);
         weight *= spline(lattice.scaled(d, x[d]) - place[d]);
       }
-      auto crossed = segments.crossed(near, x, node, piece.body, cracks);
+      auto listed = near;
+      if constexpr (Dim == 3) listed = triangles->towards(node);
+      auto crossed = segments.crossed(listed, x, node, piece.body, cracks);
       crowded += crossed.crowded;
       if (crossed.sides.empty()) return;
       for (double& sum : crossed.sums) sum *= weight;

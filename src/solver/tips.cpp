@@ -8,7 +8,8 @@
 namespace cairn {
 namespace {
 
-constexpr double hat = 1.5;  // cells, of q along a rim to each side of a point
+constexpr double hat = 1.5;        // cells, of q along a rim to each side of a point
+constexpr double rim_reach = 3.0;  // cells along a rim over which sums are averaged, to each side
 
 /// Elastic constants at a tip where the law is linear for small strains; none else.
 template <int Dim>
@@ -28,6 +29,24 @@ Vec<Dim> beside(const Lattice<Dim>& lattice, Vec<Dim> x, const Vec<Dim>& tip) {
   for (int d = 0; d < Dim; ++d)
     if (lattice.periodic(d)) x[d] -= lattice.length(d) * std::round((x[d] - tip[d]) / lattice.length(d));
   return x;
+}
+
+/// Means of the sums along rims, weighted by hat functions of the distance, and of what they are divided by: each point
+/// keeps its own axes. On a grid a curved rim is a staircase, whose steps have intensities of their own.
+void average_along_rims(std::vector<CrackTip<3>>& tips, std::vector<TipSums>& sums, double reach) {
+  const std::vector<TipSums> single = sums;
+  const std::vector<CrackTip<3>> before = tips;
+  for (std::size_t t = 0; t < tips.size(); ++t) {
+    sums[t] = {}, tips[t].weight = 0;
+    for (std::size_t u = 0; u < tips.size(); ++u) {
+      if (tips[u].crack != tips[t].crack) continue;
+      const double share = 1 - (tips[u].position - tips[t].position).norm() / reach;
+      if (!(share > 0)) continue;
+      const TipSums& s = single[u];
+      tips[t].weight += share * before[u].weight;
+      sums[t].add({share * s.J, share * s.J_static, share * s.I_opening, share * s.I_sliding, share * s.I_tearing});
+    }
+  }
 }
 
 }  // namespace
@@ -199,13 +218,16 @@ std::vector<TipState<Dim>> Simulation<Dim>::tip_states() {
   const std::size_t row = 1 + TipSums::size * tips.size();
   std::map<double, const double*> by_patch;
   for (std::size_t i = 0; i < all.size(); i += row) by_patch[all[i]] = &all[i + 1];
-  std::vector<TipState<Dim>> states;
-  for (std::size_t t = 0; t < tips.size(); ++t) {
-    TipSums sum;
+  std::vector<TipSums> sums(tips.size());
+  for (std::size_t t = 0; t < tips.size(); ++t)
     for (const auto& [patch, values] : by_patch) {
       const double* v = values + TipSums::size * t;
-      sum.add({v[0], v[1], v[2], v[3], v[4]});
+      sums[t].add({v[0], v[1], v[2], v[3], v[4]});
     }
+  if constexpr (Dim == 3) average_along_rims(tips, sums, rim_reach * lattice_.smallest_spacing());
+  std::vector<TipState<Dim>> states;
+  for (std::size_t t = 0; t < tips.size(); ++t) {
+    const TipSums& sum = sums[t];
     const CrackTip<Dim>& tip = tips[t];
     const double none = std::numeric_limits<double>::quiet_NaN(), half = tip.modulus > 0 ? 0.5 * tip.modulus : none;
     TipState<Dim> state{tip, sum.J, sum.J_static, half * sum.I_opening, half * sum.I_sliding};

@@ -165,7 +165,7 @@ ERRORS_3D = {
     "rectangle = { corner = [0.7, 0.2, 0.2], edges = [[0.0, 0.6, 0.0], [0.0, 1.2, 0.0]] }": "not parallel",
     "rectangle = { corner = [0.7, 0.2, 0.2], edges = [[0.0, 0.6, 0.0], [0.0, 0.0, 0.9]] }": "outside the domain",
     "disk = { centre = [0.33, 0.41, 0.48], normal = [0.0, 0.0, 0.0], radius = 0.1 }": "must not be zero",
-    "disk = { centre = [0.1, 0.8, 0.1], normal = [0.0, 0.0, 1.0], radius = 0.1 }": "lies in no body",
+    "disk = { centre = [0.2, 0.8, 0.2], normal = [0.0, 0.0, 1.0], radius = 0.1 }": "lies in no body",
     'triangles = "nothing.stl"': "there is no file",
     DISK + '\nends = ["tip", "tip"]': "is for 2D",
     DISK + '\ngrowth = { criterion = "steady", speed = 1.0 }': 'must be "energy" or "hoop" in 3D',
@@ -293,18 +293,19 @@ def check_balls(cairn: Program, scratch: Path) -> list[str]:
     again = cairn("check", scratch / "balls_1" / "case.toml")
     if again.code != 0:
         failures.append(f"balls: the case beside the results: {again.err}")
-    with h5py.File(scratch / "balls_1" / "cracks_000002.h5") as file:
+    with h5py.File(scratch / "balls_1" / "cracks_000000.h5") as file:
         corners, crack = file["VTKHDF/Connectivity"][:].reshape(-1, 3), file["crack"][:]
         x = file["position"][:]
         area = 0.5 * np.linalg.norm(np.cross(x[corners[:, 1]] - x[corners[:, 0]], x[corners[:, 2]] - x[corners[:, 0]]),
                                     axis=1)
-        if not (crack[corners] == crack[corners[:, :1]]).all() or abs(area[crack[corners[:, 0]] == 0].sum() /
-                                                                    (np.pi * 0.13**2) - 1) > 0.05:
-            failures.append("the triangles of the round crack do not cover it")
+        of_disk = area[crack[corners[:, 0]] == 0].sum() / (np.pi * 0.13**2)
+        if not (crack[corners] == crack[corners[:, :1]]).all() or abs(of_disk - 1) > 0.02:
+            failures.append(f"the triangles of the round crack have {of_disk} of its area")
+    with h5py.File(scratch / "balls_1" / "cracks_000002.h5") as file:
         if not np.linalg.norm(file["opening"][:], axis=1).max() > 1e-4:
             failures.append("no crack of a ball opened or slipped")
-    with h5py.File(scratch / "balls_1" / "tips_000002.h5") as file:
-        if set(file["crack"][:]) != {0} or not np.isfinite(file["J"][:]).all() or len(file["index"][:]) < 20:
+    with h5py.File(scratch / "balls_1" / "tips_000002.h5") as file:  # the surface from the file ends in the other ball
+        if set(file["crack"][:]) != {0, 2} or not np.isfinite(file["J"][:]).all() or len(file["index"][:]) < 20:
             failures.append(f"rims: {file['crack'][:]}")
     return failures
 

@@ -26,17 +26,21 @@ TEST(Cracks3D, StickingCracksAreNotThere) {
   const auto without = run<3>(whole, 60);
   double largest = 0;
   for (const auto& [id, a] : without) largest = std::max(largest, a.v.norm());
-  std::vector<Case> cases(4, whole);
-  add_planes(cases[0], CrackLaw::stick);  // on grid planes, crossing
+  std::vector<Case> cases(5, whole);
+  add_sheets(cases[0], crossing_cracks(), CrackLaw::stick);  // on grid planes
   Line wave;
   for (int i = 0; i <= 16; ++i) wave.push_back(Vec3(0.1 + 0.05 * i, 0.5031 + 0.05 * std::sin(i), 0.1));
   add_sheet(cases[1], wave, Vec3(0.05, 0, 0.8), CrackLaw::stick);
   add_disk(cases[2], Vec3(0.5, 0.47, 0.52), Vec3(0.3, 1, -0.2), 0.21, CrackLaw::stick);
   add_disk(cases[3], Vec3(0.5, 0.5, 0.5), Vec3(0, 0, 1), 0.25, CrackLaw::stick);  // on a grid plane
-  add_disk(cases[3], Vec3(0.5, 0.5, 0.5), Vec3(1, 0, 1), 0.25, CrackLaw::stick);  // ties along diagonals
-  for (std::size_t k = 0; k < cases.size(); ++k)
-    for (const auto& [id, b] : run<3>(cases[k], 60))
-      ASSERT_LE((b.v - without.at(id).v).norm(), 1e-12 * largest) << "case " << k << " point " << id;
+  add_disk(cases[3], Vec3(0.5, 0.5, 0.5), Vec3(1, 0, 0), 0.25, CrackLaw::stick);
+  add_planes(cases[4], CrackLaw::stick);  // eight fields at a node
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    double off = 0;
+    for (const auto& [id, b] : run<3>(cases[k], 60)) off = std::max(off, (b.v - without.at(id).v).norm() / largest);
+    std::printf("sticking cracks, case %zu: off by %.2g\n", k, off);
+    EXPECT_LE(off, 1e-12) << "case " << k;
+  }
 }
 
 /// Frictionless cracks let go: thrown apart, every part keeps its velocity.

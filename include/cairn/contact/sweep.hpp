@@ -115,6 +115,7 @@ class ContactSweep {
                         const ContactSettings<Dim>& settings, bool fixed);
   bool on_one_side(const ContactEntry<Dim>& a, const ContactEntry<Dim>& b, const Patch<Dim>& patch,
                    const ContactSettings<Dim>& settings) const;
+  void bind_far_fields(const Node& node, const ContactSettings<Dim>& settings);
   void add_crack_pairs(const Node& node, const Patch<Dim>& patch, const Lattice<Dim>& lattice,
                        const ContactSettings<Dim>& settings);
   const double* crossing(const ContactEntry<Dim>& entry, int crack, const Patch<Dim>& patch) const;
