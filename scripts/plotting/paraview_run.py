@@ -4,13 +4,16 @@ Run by scripts/paraview, in ParaView or pvpython; what it reads besides the run'
 """
 
 import argparse
+import math
 import os
 import sys
 from pathlib import Path
 
 from paraview.simple import (  # what ParaView 5.11 and later have
-    Calculator, ColorBy, CreateView, GetActiveView, GetAnimationScene, GetColorTransferFunction, Glyph, OpenDataFile, PVDReader,
-    ResetCamera, SaveScreenshot, SaveState, Show, TableToPoints, CSVReader, Threshold)
+    Calculator, ColorBy, CreateView, CSVReader, GetActiveView, GetAnimationScene, GetColorTransferFunction, GetScalarBar, Glyph,
+    OpenDataFile, PVDReader, ResetCamera, SaveScreenshot, SaveState, Show, TableToPoints, ThresholdTable)
+
+UNITS = {"stress": "Pa", "stress_smooth": "Pa", "velocity": "m/s", "pressure": "Pa", "force": "N"}
 
 
 def load(run: Path, value: str) -> dict:
@@ -23,13 +26,14 @@ def load(run: Path, value: str) -> dict:
     made["points"] = OpenDataFile(str(index))
     made["points"].UpdatePipelineInformation()
     table = run / "export" / "grains.csv"
-    rows = TableToPoints(Input=CSVReader(FileName=[str(table)]), XColumn="x", YColumn="y", ZColumn="z", KeepAllDataArrays=1)
+    rows = CSVReader(FileName=[str(table)])
     # The table holds all outputs: the last is shown.
-    rows.UpdatePipeline()
-    last = rows.PointData["step"].GetRange()[1]
-    grains = Threshold(Input=rows, Scalars=["POINTS", "step"], LowerThreshold=last, UpperThreshold=last)
+    last = int(table.read_text(encoding="utf-8").splitlines()[-1].split(",")[0])
+    rows = ThresholdTable(Input=rows, Column=["ROWS", "step"], MinValue=last, MaxValue=last)
+    grains = TableToPoints(Input=rows, XColumn="x", YColumn="y", ZColumn="z", KeepAllDataArrays=1)
     pressure = Calculator(Input=grains, ResultArrayName="pressure", Function="-(stress_xx+stress_yy+stress_zz)/3")
     made["grains"] = Glyph(Input=pressure, GlyphType="Sphere", ScaleArray=["POINTS", "radius"], ScaleFactor=2.0, GlyphMode="All Points")
+    made["grains"].GlyphType.ThetaResolution = made["grains"].GlyphType.PhiResolution = 24
     lines = run / "export" / "contacts.pvd"
     if lines.is_file():
         made["contacts"] = PVDReader(FileName=str(lines))
@@ -41,8 +45,8 @@ def show(view, made: dict, value: str) -> dict:
     GetAnimationScene().UpdateAnimationUsingDataTimeSteps()
     view.ViewTime = made["points"].TimestepValues[-1]
     points = Show(made["points"], view)
-    points.SetRepresentationType("Points")
-    points.PointSize = 4
+    points.SetRepresentationType("Point Gaussian")
+    points.GaussianRadius = 0.4 * apart(made["points"])
     names = made["points"].PointData.keys()
     if value not in names:
         sys.exit(f"paraview: there is no '{value}'; there are {', '.join(names)}")
@@ -50,15 +54,36 @@ def show(view, made: dict, value: str) -> dict:
     ColorBy(points, ("POINTS", value, "Magnitude") if components > 1 else ("POINTS", value))
     points.RescaleTransferFunctionToDataRange(True, False)
     GetColorTransferFunction(value).ApplyPreset("Viridis (matplotlib)", True)
-    points.SetScalarBarVisibility(view, True)
+    label(view, points, value, f"norm of {value}" if components > 1 else value, [0.87, 0.55])
+    made["grains"].UpdatePipeline()
     spheres = Show(made["grains"], view)
     spheres.Opacity = 0.25
     ColorBy(spheres, ("POINTS", "pressure"))
+    spheres.RescaleTransferFunctionToDataRange(True, False)
+    label(view, spheres, "pressure", "pressure of bodies", [0.87, 0.1])
     if "contacts" in made:
         lines = Show(made["contacts"], view)
         lines.LineWidth = 3
         ColorBy(lines, ("CELLS", "force"))
     return made
+
+
+def apart(source) -> float:
+    """About how far points are from each other [m]."""
+    source.UpdatePipeline()
+    data = source.GetDataInformation()
+    bounds = data.GetBounds()
+    sides = [high - low for low, high in zip(bounds[::2], bounds[1::2]) if high > low]
+    return (math.prod(sides) / max(1, data.GetNumberOfPoints())) ** (1 / max(1, len(sides)))
+
+
+def label(view, shown, value: str, title: str, place: list) -> None:
+    """A narrow scale at the right edge, with its unit."""
+    shown.SetScalarBarVisibility(view, True)
+    bar = GetScalarBar(GetColorTransferFunction(value), view)
+    bar.Title, bar.ComponentTitle = f"{title} ({UNITS[value]})" if value in UNITS else title, ""
+    bar.WindowLocation, bar.Position, bar.ScalarBarLength = "Any Location", place, 0.35
+    bar.TitleFontSize, bar.LabelFontSize, bar.ScalarBarThickness = 12, 12, 14
 
 
 def main() -> None:
@@ -70,10 +95,13 @@ def main() -> None:
     inside = os.environ.get("CAIRN_RUN")
     options = parser.parse_args([inside] if inside else None)
     made = load(options.run.resolve(), options.value)
+    size = [1200, 900]
+    if options.picture:
+        GetActiveView().ViewSize = size
     if options.picture or inside:
         ResetCamera()
     if options.picture:
-        SaveScreenshot(options.picture, ImageResolution=[1200, 900], OverrideColorPalette="WhiteBackground")
+        SaveScreenshot(options.picture, ImageResolution=size, OverrideColorPalette="WhiteBackground")
     if options.state:
         SaveState(options.state)
     for name, source in made.items():

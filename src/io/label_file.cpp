@@ -20,7 +20,7 @@ constexpr const char* kind = "labels";
 /// An open file, and the name that messages give it.
 struct LabelFile {
   std::string name;
-  Handle file, voxels;
+  Handle file, voxels, depth;
 
   [[noreturn]] void fail(std::string_view text) const { throw InputError(fmt::format("{}: {}", name, text)); }
 
@@ -56,6 +56,8 @@ void open(LabelFile& f) {
   H5Pset_chunk_cache(access, 1009, std::size_t{64} << 20, 1.0);
   f.voxels = Handle(H5Dopen(f.file, "voxels", access), H5Dclose);
   if (!f.voxels.valid()) f.fail("has no data set 'voxels'; make it by scripts/convert-labels");
+  f.depth = Handle(H5Dopen(f.file, "depth", access), H5Dclose);
+  if (!f.depth.valid()) f.fail("has no data set 'depth'; make it by scripts/convert-labels of this version");
 }
 
 /// What the file says of each label; checked, since places in it follow from these.
@@ -92,11 +94,12 @@ std::vector<LabelFacts> facts_of(const LabelFile& f, const std::array<std::int64
 }  // namespace
 
 std::shared_ptr<const LabelVolume> open_labels(const std::filesystem::path& file, std::uint64_t& sum) {
-  auto f = std::make_shared<LabelFile>(LabelFile{file.string(), {}, {}});
+  auto f = std::make_shared<LabelFile>(LabelFile{file.string(), {}, {}, {}});
   const PosixFile bytes(file, O_RDONLY);
   if (!bytes.valid() || bytes.size() < 0 || !checksum_of(bytes, sum)) f->fail("cannot be read");
   open(*f);
   const std::vector<hsize_t> extent = f->extent(f->voxels);
+  if (f->extent(f->depth) != extent) f->fail("its data set 'depth' is not of the size of 'voxels'");
   const int dim = static_cast<int>(extent.size());
   if (dim != 2 && dim != 3) f->fail(fmt::format("its voxels have {} dimensions; they must have 2 or 3", dim));
   std::array<std::int64_t, 3> size = {1, 1, 1};
@@ -110,13 +113,15 @@ std::shared_ptr<const LabelVolume> open_labels(const std::filesystem::path& file
       f->fail(fmt::format("its attributes spacing_{0} and corner_{0} are missing or wrong", names[k]));
   }
   auto facts = facts_of(*f, size, corner, spacing, dim);
-  VoxelSource source = [f, dim](const auto& lower, const auto& count, std::span<std::int64_t> voxels) {
+  VoxelSource source = [f, dim](const auto& lower, const auto& count, std::span<std::int64_t> labels,
+                                std::span<std::uint8_t> depths) {
     hsize_t start[3], sizes[3];
     for (int k = 0; k < dim; ++k)
       start[k] = static_cast<hsize_t>(lower[dim - 1 - k]), sizes[k] = static_cast<hsize_t>(count[dim - 1 - k]);
     const Handle there(H5Dget_space(f->voxels), H5Sclose), here(H5Screate_simple(dim, sizes, nullptr), H5Sclose);
     H5Sselect_hyperslab(there, H5S_SELECT_SET, start, nullptr, sizes, nullptr);
-    if (H5Dread(f->voxels, H5T_NATIVE_INT64, here, there, H5P_DEFAULT, voxels.data()) < 0)
+    if (H5Dread(f->voxels, H5T_NATIVE_INT64, here, there, H5P_DEFAULT, labels.data()) < 0 ||
+        H5Dread(f->depth, H5T_NATIVE_UINT8, here, there, H5P_DEFAULT, depths.data()) < 0)
       throw RunError(fmt::format("{}: its voxels cannot be read: {}", f->name, hdf5::error_text()));
   };
   return std::make_shared<LabelVolume>(dim, size, corner, spacing, std::move(facts), std::move(source));

@@ -7,6 +7,7 @@ Uses pvpython, or the vtkmodules of this Python (which open single files only). 
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -162,9 +163,10 @@ def check_script(out: Path, scratch: Path, points: int) -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"scripts/paraview failed\n{done.stdout}\n{done.stderr}"
     assert f"points: {points} points" in done.stdout, done.stdout
-    assert "grains: " in done.stdout and "contacts: " in done.stdout, done.stdout
+    spheres = re.search(r"grains: (\d+) points", done.stdout)
+    assert spheres and int(spheres[1]) > 2 * 20 and "contacts: " in done.stdout, f"not two spheres\n{done.stdout}"
     assert picture.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and picture.stat().st_size > 5000, "no picture was drawn"
-    assert "TableToPoints" in state.read_text(), "the pipeline was not saved"
+    assert "ThresholdTable" in state.read_text(), "the pipeline was not saved"
 
 
 def check_lines(out: Path) -> None:

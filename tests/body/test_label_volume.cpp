@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -8,10 +9,11 @@
 namespace cairn {
 namespace {
 
-/// A volume in memory, that notes the largest box that was asked for.
+/// A volume in memory, that notes the largest box that was asked for. All voxels are as deep unless `depth` says it.
 struct Voxels {
   std::array<std::int64_t, 3> size;
   std::vector<std::int64_t> labels;
+  std::vector<std::uint8_t> depth;
   std::size_t largest = 0;
 
   template <class F>
@@ -23,13 +25,16 @@ struct Voxels {
   LabelVolume volume(int dimension, std::vector<std::int64_t> known, double weight = 1) {
     std::vector<LabelFacts> facts;
     for (const auto label : known) facts.push_back({label, std::ranges::count(labels, label), {}, {}, 1, weight});
-    return {dimension, size, Vec3::Zero(), Vec3::Ones(), facts, [this](const auto& low, const auto& n, auto to) {
+    return {dimension, size, Vec3::Zero(), Vec3::Ones(), facts, [this](const auto& low, const auto& n, auto to, auto deep) {
               largest = std::max(largest, to.size());
               std::size_t i = 0;
               for (std::int64_t z = low[2]; z < low[2] + n[2]; ++z)
                 for (std::int64_t y = low[1]; y < low[1] + n[1]; ++y)
                   for (std::int64_t x = low[0]; x < low[0] + n[0]; ++x)
-                    to[i++] = labels.at((z * size[1] + y) * size[0] + x);
+                    {
+                      const auto at = static_cast<std::size_t>((z * size[1] + y) * size[0] + x);
+                      to[i] = labels.at(at), deep[i] = depth.empty() ? 100 : depth.at(at), ++i;
+                    }
             }};
   }
 };
@@ -47,28 +52,31 @@ TEST(LabelVolume, FlatFacesStayWhereTheyAreAndNothingIsHeldTwiceOrNotAtAll) {
   EXPECT_LT(voxels.largest, 40U * 40 * 40) << "never the whole volume at once";
 }
 
-TEST(LabelVolume, ADiscIsRoundThoughItsVoxelsAreStairs) {
+TEST(LabelVolume, ADiscIsAsRoundAsItsDepthsSay) {
   constexpr double r = 16.3;
   const Vec3 centre(24.2, 23.9, 0);
-  Voxels voxels({48, 48, 1},
-                [&](double x, double y, double) { return std::hypot(x - centre.x(), y - centre.y()) < r ? 1 : 0; });
+  const auto below = [&](double x, double y) { return r - std::hypot(x - centre.x(), y - centre.y()); };
+  Voxels voxels({48, 48, 1}, [&](double x, double y, double) { return below(x, y) > 0 ? 1 : 0; });
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 48; ++x)
+      voxels.depth.push_back(
+          static_cast<std::uint8_t>(std::clamp(std::round(std::abs(below(x + 0.5, y + 0.5)) * 170), 1.0, 255.0)));
   const LabelVolume volume = voxels.volume(2, {1});
-  constexpr int directions = 720;
-  const auto roughness = [&](auto&& inside) {  // standard deviation of the radius, in voxels
-    double sum = 0, squares = 0;
-    for (int i = 0; i < directions; ++i) {
-      const double t = 2 * std::numbers::pi * i / directions;
-      double d = r - 2;
-      while (inside(Vec3(centre + d * Vec3(std::cos(t), std::sin(t), 0)))) d += 0.01;
-      sum += d, squares += d * d;
-    }
-    return std::sqrt(squares / directions - std::pow(sum / directions, 2));
-  };
-  const double smooth = roughness([&](const Vec3& x) { return volume.label_at(x) == 0; });
-  const double stairs =
-      roughness([&](const Vec3& x) { return voxels.labels[std::size_t(x.y()) * 48 + std::size_t(x.x())] == 1; });
-  EXPECT_GT(stairs, 0.25);
-  EXPECT_LT(smooth, 0.6 * stairs);
+  for (int i = 0; i < 720; ++i) {
+    const double t = std::numbers::pi * i / 360;
+    const Vec3 out(std::cos(t), std::sin(t), 0);
+    EXPECT_EQ(volume.label_at(centre + (r - 0.04) * out), 0) << t;
+    EXPECT_EQ(volume.label_at(centre + (r + 0.04) * out), -1) << t;
+  }
+}
+
+TEST(LabelVolume, OfThreeLabelsTheOneWithTheLargestSumHoldsAPlace) {
+  Voxels voxels({2, 2, 1}, [](double x, double y, double) { return y > 1 ? 9 : x > 1 ? 5 : 2; });
+  voxels.depth = {60, 80, 50, 40};  // of the labels 2, 5, and 9 twice
+  const LabelVolume volume = voxels.volume(2, {2, 5, 9});
+  EXPECT_EQ(volume.label_at({1, 1, 0}), 2) << "a quarter of 50 + 40 is more than one of 80";
+  EXPECT_EQ(volume.label_at({1, 0.85, 0}), 1);
+  EXPECT_EQ(volume.label_at({0.6, 0.6, 0}), 0);
 }
 
 TEST(LabelVolume, AWeightMovesTheSurfaceOutwards) {
@@ -80,7 +88,7 @@ TEST(LabelVolume, AWeightMovesTheSurfaceOutwards) {
     return inside / 100.0;
   };
   EXPECT_NEAR(width(1), 20, 0.011);
-  EXPECT_NEAR(width(std::exp(0.5)), 20 + 2 * 0.5 * 0.65, 0.12);
+  EXPECT_NEAR(width(1.5), 20 + 2 * (0.6 - 0.5), 0.011) << "between middles, at 1.5 / (1.5 + 1)";
 }
 
 }  // namespace

@@ -1,9 +1,9 @@
 #pragma once
-/// Images and volumes of labels (docs/shapes.md). A place belongs to the label with the largest weight times share, of
-/// those that the voxels around it have after they were smoothed: each label's share is the Gaussian mean of its voxels
-/// (a standard deviation of one voxel, cut off at three), linear between their centres. The shares of all labels, void
-/// among them, add up to one everywhere, so that touching bodies leave no gap and do not overlap. The weights, found by
-/// whoever made the file, keep the volumes.
+/// Images and volumes of labels (docs/shapes.md). Each voxel has a label and a depth, how far its middle lies below the
+/// surface of its label's body. A place belongs to the label with the largest sum of weight times depth over the middles of
+/// voxels around it, linear between them: between two bodies, or a body and void, that is where the interpolated signed
+/// distance is zero. Each place has one owner, so that touching bodies leave no gap and do not overlap, and the middle of a
+/// voxel is its own label's. Depths, and the weights that keep the volumes, are found by whoever made the file.
 
 #include <array>
 #include <cstdint>
@@ -26,9 +26,11 @@ struct LabelFacts {
   double weight = 1;
 };
 
-/// The voxels of a box, x fastest, from the file: its lower corner, its sizes, and room for them.
-using VoxelSource = std::function<void(const std::array<std::int64_t, 3>& lower,
-                                       const std::array<std::int64_t, 3>& size, std::span<std::int64_t> voxels)>;
+/// The voxels of a box, x fastest, from the file: its lower corner, its sizes, and room for their labels and depths (above
+/// 0, in any unit).
+using VoxelSource =
+    std::function<void(const std::array<std::int64_t, 3>& lower, const std::array<std::int64_t, 3>& size,
+                       std::span<std::int64_t> labels, std::span<std::uint8_t> depths)>;
 
 class LabelVolume {
  public:
@@ -56,17 +58,14 @@ class LabelVolume {
   /// Nodes, the centres of voxels, from the block's first to one beyond its last.
   struct Block {
     std::array<int, 3> nodes{};
-    std::vector<std::int32_t> labels;          // indices of those that some node has a share of; -1: void
-    std::vector<std::int32_t> sole;            // of a node: the place in `labels` of the only one there, or -1
-    std::vector<std::vector<float>> weighted;  // of each label: its weight times its share
-    std::size_t bytes() const;
+    std::vector<std::int32_t> labels;  // of each node: its index; -1: void
+    std::vector<float> depths;         // times the label's weight
+    std::size_t bytes() const { return sizeof(Block) + labels.size() * (sizeof(std::int32_t) + sizeof(float)); }
   };
   using Key = std::array<std::int64_t, 3>;
 
   const Block& block_at(const Key& key) const;
   Block make_block(const Key& key) const;
-  std::vector<std::int32_t> read_around(const Key& key, std::array<std::int64_t, 3>& size) const;
-  void share_out(Block& block, std::vector<std::int32_t> voxels, const std::array<std::int64_t, 3>& size) const;
   int index_of(std::int64_t label) const;
 
   int dimension_;
