@@ -5,7 +5,7 @@
 #include <optional>
 #include <tuple>
 
-#include "triangles_around.hpp"
+#include "segments_seen.hpp"
 
 namespace cairn {
 namespace {
@@ -73,33 +73,6 @@ RowState<Dim> state_of(const CrackSurroundings<Dim>& around, int crack, const In
   }
   return state;
 }
-
-/// Segments that lines from a face to the nodes around it may cross: of the own crack from where it begins, of others.
-template <int Dim>
-class SegmentsSeen {
- public:
-  SegmentsSeen(const CrackSurroundings<Dim>& around, int crack, const Vec<Dim>& face, const Vec<Dim>& start)
-      : own_(around.segments.near(start, around.lattice)), others_(around.segments.near(face, around.lattice)) {
-    if constexpr (Dim == 3) {
-      const Vec<Dim> reach = 1.51 * around.lattice.spacing();  // of the nodes nearest to the face
-      const Vec<Dim> further = reach + (start - face).cwiseAbs();
-      own_triangles_.emplace(around.segments, own_, start, further, [&](int c) { return c == crack; });
-      other_triangles_.emplace(around.segments, others_, face, reach, [&](int c) { return c != crack; });
-    }
-  }
-  std::span<const int> own(const Vec<Dim>& node) {
-    if constexpr (Dim == 3) return own_triangles_->towards(node);
-    return own_;
-  }
-  std::span<const int> others(const Vec<Dim>& node) {
-    if constexpr (Dim == 3) return other_triangles_->towards(node);
-    return others_;
-  }
-
- private:
-  std::span<const int> own_, others_;
-  std::optional<TrianglesAround> own_triangles_, other_triangles_;
-};
 
 /// The cracks that the line from a face to a node crosses: the own one is left on the side's side.
 template <int Dim>
@@ -347,43 +320,6 @@ std::vector<FaceMotion<Dim>> find_face_velocities(std::vector<CrackPoint<Dim>>& 
   return told;
 }
 
-namespace {
-
-/// The crack point with material beside it that is nearest to the k-th, of those of the same crack; k where there is
-/// none.
-std::ptrdiff_t nearest_filled(const std::vector<CrackPoint<3>>& points, std::ptrdiff_t k) {
-  std::ptrdiff_t nearest = k;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::ptrdiff_t j = 0; j < std::ssize(points); ++j) {
-    const double squared = (points[j].plane - points[k].plane).squaredNorm();
-    if (points[j].crack != points[k].crack || points[j].image != points[k].image || !points[j].filled) continue;
-    if (squared < least) least = squared, nearest = j;
-  }
-  return nearest;
-}
-
-}  // namespace
-
-template <int Dim>
-void borrow_face_velocities(std::vector<CrackPoint<Dim>>& points) {
-  const auto n = static_cast<std::ptrdiff_t>(points.size());
-  for (std::ptrdiff_t k = 0; k < n; ++k) {
-    if (!points[k].own || points[k].filled) continue;
-    const auto on_line = [&](std::ptrdiff_t j) {
-      return j >= 0 && j < n && points[j].crack == points[k].crack && points[j].image == points[k].image;
-    };
-    const auto nearest = [&]() -> std::ptrdiff_t {
-      if constexpr (Dim == 3) return nearest_filled(points, k);
-      for (std::ptrdiff_t away = 1; on_line(k - away) || on_line(k + away); ++away)
-        for (const std::ptrdiff_t j : {k - away, k + away})
-          if (on_line(j) && points[j].filled) return j;
-      return k;
-    }();
-    points[k].lower_velocity = points[nearest].lower_velocity,
-    points[k].upper_velocity = points[nearest].upper_velocity;
-  }
-}
-
 template <int Dim>
 void keep_idle_bonds_closed(std::vector<CrackPoint<Dim>>& points) {
   for (CrackPoint<Dim>& point : points) {
@@ -460,8 +396,7 @@ void add_row_forces(Patch<Dim>& patch, const CrackSurroundings<Dim>& around, con
       const CrackSurroundings<Dim>&, double, const std::function<Vec<Dim>(const CrackPoint<Dim>&, const Vec<Dim>&)>&); \
   template void sort_row_forces(std::vector<RowForce<Dim>>&);                                                          \
   template void add_row_forces(Patch<Dim>&, const CrackSurroundings<Dim>&, const std::vector<RowForce<Dim>>&);         \
-  template void keep_idle_bonds_closed(std::vector<CrackPoint<Dim>>&);                                                 \
-  template void borrow_face_velocities(std::vector<CrackPoint<Dim>>&);
+  template void keep_idle_bonds_closed(std::vector<CrackPoint<Dim>>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

@@ -89,6 +89,85 @@ void add(std::vector<CrackPoint<3>>& points, const std::vector<NewPoint>& added)
   std::ranges::sort(points, [](const auto& a, const auto& b) { return a < b; });
 }
 
+std::vector<Edge> sorted_edges(const std::vector<std::int64_t>& numbers) {
+  std::vector<Edge> edges;
+  for (std::size_t i = 0; i < numbers.size(); i += 3) {
+    Edge edge;
+    for (int k = 0; k < 3; ++k) edge[k] = static_cast<int>(numbers[i + k]);
+    edges.push_back(edge);
+  }
+  std::ranges::sort(edges);
+  return edges;
+}
+
+/// The rims inside bodies, and which of their points grow.
+struct Rims {
+  struct Ahead {
+    int index;     // of the new point
+    Vec<3> place;  // [m]
+  };
+  std::map<Name, CrackTip<3>> tips;
+  std::map<Name, Ahead> grows;
+  double longest_edge;  // [m]
+  std::vector<Crack>& cracks;
+
+  /// A point of a rim that grows by a length [m], or not.
+  void add(const CrackTip<3>& tip, double by, Strip& strip) {
+    const Name name = {tip.crack, tip.end};
+    tips[name] = tip;
+    if (!(by > 0)) return;
+    const int index = ++cracks[tip.crack].ends[1];
+    grows[name] = {index, tip.position + by * tip.ahead};
+    strip.points.push_back({tip.crack, index, name, by * tip.ahead, {}});
+    strip.tips[name] = false;
+  }
+  int next(const Name& name) const { return grows.contains(name) ? grows.at(name).index : name.second; }
+  Vec<3> place(const Name& name) const { return grows.contains(name) ? grows.at(name).place : tips.at(name).position; }
+  /// A place so far ahead of what an edge becomes.
+  Vec<3> ahead_of_edge(const Edge& edge, double far) const {
+    const Name a = {edge[0], edge[1]}, b = {edge[0], edge[2]};
+    return 0.5 * (place(a) + place(b)) + far * (tips.at(a).ahead + tips.at(b).ahead).normalized();
+  }
+
+  /// Triangles between the old edges and the new ones. \param inside  whether new edges lie in a body
+  void lay(const std::vector<Edge>& edges, const std::vector<bool>& inside, Strip& strip) {
+    std::map<Name, int> count;  // edges of a point
+    for (const auto& [crack, a, b] : edges) ++count[{crack, a}], ++count[{crack, b}];
+    for (std::size_t e = 0; e < edges.size(); ++e) {
+      const Name a = {edges[e][0], edges[e][1]}, b = {edges[e][0], edges[e][2]};
+      const bool stays = !grows.contains(a) && !grows.contains(b);
+      for (const Name& end : {a, b})
+        if (!grows.contains(end)) strip.tips[end] |= stays || inside[e];
+      if (stays) continue;
+      strip.edges[edges[e]] = CrackEdge::inner;
+      for (const Name& end : {a, b})
+        if (grows.contains(end)) strip.point(end.first, next(end)).held.tip |= inside[e];
+      // Where a rim leaves the body what grows beside its last point is open.
+      const auto side = [&](const Name& end) { return count[end] == 1 ? CrackEdge::open : CrackEdge::inner; };
+      lay_beside(a, b, {side(a), side(b)}, inside[e] ? CrackEdge::tip : CrackEdge::open, strip);
+    }
+  }
+
+ private:
+  /// The triangles beside the edge from a to b; \param sides  what the edges from a and b to their new points are
+  void lay_beside(const Name& a, const Name& b, std::array<CrackEdge, 2> sides, CrackEdge kind, Strip& strip) {
+    constexpr CrackEdge inner = CrackEdge::inner;
+    const int crack = a.first, a2 = next(a), b2 = next(b);
+    if (!grows.contains(a)) return hold(strip.point(crack, b2), b.second, a.second, {sides[1], inner, kind});
+    if (!grows.contains(b)) return hold(strip.point(crack, a2), b.second, a.second, {kind, inner, sides[0]});
+    hold(strip.point(crack, a2), b.second, a.second, {inner, inner, sides[0]});
+    int before = a2;  // of the new point at b
+    if ((place(b) - place(a)).norm() > longest_edge) {
+      before = ++cracks[crack].ends[1];
+      NewPoint middle{crack, before, a, 0.5 * (place(a) + place(b)) - tips.at(a).position, {}};
+      middle.held.tip = kind == CrackEdge::tip;
+      hold(middle, b.second, a2, {inner, inner, kind});
+      strip.points.push_back(middle);
+    }
+    hold(strip.point(crack, b2), b.second, before, {sides[1], inner, kind});
+  }
+};
+
 }  // namespace
 
 /// Whether the bodies that a crack cuts are at places, the same on every rank. Collective.
@@ -111,82 +190,22 @@ template <int Dim>
 void Simulation<Dim>::grow_rims() {
   if constexpr (Dim == 3) {
     const double h = lattice_.smallest_spacing();
-    std::map<Name, CrackTip<3>> rim;
-    std::map<Name, int> grows;  // the index of the point ahead
+    Rims rims{{}, {}, longest * h, cracks_};
     Strip strip;
     for (const auto& state : tip_states()) {
-      const CrackTip<3>& tip = state.tip;
-      const GrowthSpec& growth = growth_[tip.crack];
-      rim[{tip.crack, tip.end}] = tip;
-      if (growth.criterion == GrowthCriterion::none || steps_ % growth.every != 0) continue;
+      const GrowthSpec& growth = growth_[state.tip.crack];
       const bool by_energy = growth.criterion == GrowthCriterion::energy;
-      if (!(by_energy ? state.J >= growth.energy : state.K_opening >= growth.toughness)) continue;
-      const int index = ++cracks_[tip.crack].ends[1];
-      grows[{tip.crack, tip.end}] = index;
-      NewPoint point{tip.crack, index, {tip.crack, tip.end}, growth.length * h * tip.ahead, {}};
-      strip.points.push_back(point), strip.tips[{tip.crack, tip.end}] = false;
+      const bool grows = growth.criterion != GrowthCriterion::none && steps_ % growth.every == 0 &&
+                         (by_energy ? state.J >= growth.energy : state.K_opening >= growth.toughness);
+      rims.add(state.tip, grows ? growth.length * h : 0.0, strip);
     }
-    if (grows.empty()) return;
-    const auto gathered = gather_on_all(own_edges(patches_), comm_);
-    std::vector<Edge> edges;
-    for (std::size_t i = 0; i < gathered.size(); i += 3) {
-      Edge edge;
-      for (int k = 0; k < 3; ++k) edge[k] = static_cast<int>(gathered[i + k]);
-      edges.push_back(edge);
-    }
-    std::ranges::sort(edges);
-    const auto next_of = [&](int crack, int index) {
-      const auto at = grows.find({crack, index});
-      return at == grows.end() ? index : at->second;
-    };
-    const auto place_of = [&](int crack, int index) -> Vec<3> {
-      const CrackTip<3>& tip = rim.at({crack, index});
-      const double by = grows.contains({crack, index}) ? growth_[crack].length * h : 0.0;
-      return tip.position + by * tip.ahead;
-    };
-    // Where the new edges lie in a body they are tips.
+    if (rims.grows.empty()) return;
+    const auto edges = sorted_edges(gather_on_all(own_edges(patches_), comm_));
     std::vector<int> of_crack;
-    std::vector<Vec<3>> places;
-    for (const auto& [crack, a, b] : edges) {
-      const Vec<3> out = (rim.at({crack, a}).ahead + rim.at({crack, b}).ahead).normalized();
-      of_crack.push_back(crack);
-      places.push_back(0.5 * (place_of(crack, a) + place_of(crack, b)) + ahead_of * h * out);
-    }
-    const auto inside = find_material(of_crack, places);
-    std::map<Name, int> touched;  // edges of a point's
-    for (const auto& [crack, a, b] : edges) ++touched[{crack, a}], ++touched[{crack, b}];
-    for (std::size_t e = 0; e < edges.size(); ++e) {
-      const auto& [crack, a, b] = edges[e];
-      const int a2 = next_of(crack, a), b2 = next_of(crack, b);
-      const bool stays = a2 == a && b2 == b;
-      for (const int end : {a, b})
-        if (!grows.contains({crack, end})) strip.tips[{crack, end}] |= stays || inside[e];
-      if (stays) continue;
-      const CrackEdge kind = inside[e] ? CrackEdge::tip : CrackEdge::open;
-      strip.edges[edges[e]] = CrackEdge::inner;
-      // Where a rim leaves the body what grows beside its last point is open.
-      const auto side = [&](int end) { return touched[{crack, end}] == 1 ? CrackEdge::open : CrackEdge::inner; };
-      const Vec<3> from = place_of(crack, a), to = place_of(crack, b);
-      if (a2 == a) {
-        hold(strip.point(crack, b2), b, a, {side(b), CrackEdge::inner, kind});
-      } else if (b2 == b) {
-        hold(strip.point(crack, a2), b, a, {kind, CrackEdge::inner, side(a)});
-      } else {
-        hold(strip.point(crack, a2), b, a, {CrackEdge::inner, CrackEdge::inner, side(a)});
-        if ((to - from).norm() > longest * h) {
-          const int middle = ++cracks_[crack].ends[1];
-          NewPoint point{crack, middle, {crack, a}, 0.5 * (from + to) - rim.at({crack, a}).position, {}};
-          point.held.tip = inside[e];
-          hold(point, b, a2, {CrackEdge::inner, CrackEdge::inner, kind});
-          strip.points.push_back(point);
-          hold(strip.point(crack, b2), b, middle, {side(b), CrackEdge::inner, kind});
-        } else {
-          hold(strip.point(crack, b2), b, a2, {side(b), CrackEdge::inner, kind});
-        }
-      }
-      for (const int end : {a2, b2})
-        if (end != a && end != b) strip.point(crack, end).held.tip |= inside[e];
-    }
+    std::vector<Vec<3>> places;  // where there is material new edges are tips
+    for (const Edge& edge : edges)
+      of_crack.push_back(edge[0]), places.push_back(rims.ahead_of_edge(edge, ahead_of * h));
+    rims.lay(edges, find_material(of_crack, places), strip);
     for (auto& patch : patches_) tell(patch.cracks, strip), add(patch.cracks, strip.points);
     receive_cracks();
   }
