@@ -56,7 +56,8 @@ inline constexpr CrackVector<Dim> crack_vectors[] = {{"crack_plane", &CrackPoint
                                                      {"crack_lower", &CrackPoint<Dim>::lower},
                                                      {"crack_upper", &CrackPoint<Dim>::upper},
                                                      {"crack_lower_velocity", &CrackPoint<Dim>::lower_velocity},
-                                                     {"crack_upper_velocity", &CrackPoint<Dim>::upper_velocity}};
+                                                     {"crack_upper_velocity", &CrackPoint<Dim>::upper_velocity},
+                                                     {"crack_traction", &CrackPoint<Dim>::traction}};
 inline constexpr int crack_numbers = 9;  // crack, index, next, filled, faces_filled, state of the bond, image
 inline constexpr int bond_numbers = 4;   // length, peaks, dissipated
 inline constexpr int held_numbers = 2 + 3 * CrackHeld<3>::most;  // in 3D: tip, triangles held, what they are

@@ -106,6 +106,7 @@ void Simulation<Dim>::follow_openings() {
     find_cracks(patch);
     for (auto& point : patch.cracks) {
       if (point.bond.state == Bond::none) continue;
+      if (point.bond.state == Bond::holds && point.faces_filled != 3) continue;  // it rests: the line may turn there
       const TractionLaw& law = *traction_laws_[point.crack];
       const Opening<Dim> opening(segments_of(patch), point, point.opening());
       law.follow(opening.d, point.bond);

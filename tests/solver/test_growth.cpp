@@ -36,8 +36,7 @@ void tear(Simulation<2>& simulation, double angle, double speed) {
 }
 
 /// With a cohesive law behind the tip, growth takes G_c for each new area, on any grid and in any direction.
-// Not to this bar yet: docs/cracks.md has the numbers.
-TEST(Growth, DISABLED_TakesTheEnergyOfItsArea) {
+TEST(Growth, TakesTheEnergyOfItsArea) {
   for (const double angle : {0.0, M_PI / 4})
     for (const int cells : {20, 30, 40}) {
       Simulation<2> simulation(torn_disk(cells, angle), MPI_COMM_SELF);

@@ -73,7 +73,15 @@ TEST(Tractions, AWaveThroughAnInterface) {
   EXPECT_LE(std::sqrt(squares / n), 0.07);
 }
 
-/// Halves pulled or shifted apart: what the crack took is G_c times its length, and the grips gave no more.
+bool some_bond_holds(const Simulation<2>& simulation) {
+  for (const auto& patch : simulation.patches())
+    for (const auto& point : patch.cracks)
+      if (point.bond.state == Bond::holds && point.bond.length > 0) return true;
+  return false;
+}
+
+/// Halves pulled or shifted apart: what the crack took is G_c times its length, and the grips gave no more until it was
+/// through.
 void pull_halves_apart(std::initializer_list<CohesiveShape> shapes) {
   for (const bool shear : {false, true})
     for (const auto shape : shapes) {
@@ -85,7 +93,8 @@ void pull_halves_apart(std::initializer_list<CohesiveShape> shapes) {
       law.peak = 0.3;
       c.solver.noise_filter = NoiseFilter::off;
       Simulation<2> simulation(c, MPI_COMM_SELF);
-      double peak = 0, before = 0, worst = 0;
+      double peak = 0, before = 0, worst = 0, work = 0;
+      bool holds = true;  // then the halves ring, their waves overshoot, and the grips take what reaches them
       const double critical = shape == CohesiveShape::exponential ? 0.3 : 0.2;
       while (speed * simulation.time() < 2 * critical) {
         simulation.step(1e300);
@@ -94,15 +103,15 @@ void pull_halves_apart(std::initializer_list<CohesiveShape> shapes) {
           if (p.x.y() > 0.3 * L) continue;
           stress += p.mass * p.stress.c[shear ? 3 : 1], volume += p.mass;
         }
-        peak = std::max(peak, stress / volume);
         const Totals t = simulation.totals();
+        if (holds) peak = std::max(peak, stress / volume), work = t.boundary_work - t.kinetic - t.strain;
+        holds = holds && some_bond_holds(simulation);
         EXPECT_GE(t.crack_dissipation, before - 1e-12 * 6 * law.energy[0]);
         before = t.crack_dissipation;
         worst = std::max(worst, std::abs(t.energy()));
       }
       const Totals t = simulation.totals();
       const double G = law.energy[0] * 6, share = shape == CohesiveShape::exponential ? 1 - 9 * std::exp(-8.0) : 1;
-      const double work = t.boundary_work - t.kinetic - t.strain;
       std::printf(
           "%s, shape %d: crack's work %.4f of G_c A, grips' %.4f, peak stress %.4f, book off by %.4f of G_c A\n",
           shear ? "shear" : "tension", static_cast<int>(shape), t.crack_dissipation / G, work / G,
@@ -115,10 +124,37 @@ void pull_halves_apart(std::initializer_list<CohesiveShape> shapes) {
 }
 
 TEST(Tractions, HalvesPulledApartTakeTheEnergyOfTheLaw) {
-  pull_halves_apart({CohesiveShape::triangle, CohesiveShape::exponential});
+  pull_halves_apart({CohesiveShape::triangle, CohesiveShape::exponential, CohesiveShape::linear});
 }
-// Rigid until it breaks, the linear law holds to 1.23 of its strength (docs/cracks.md).
-TEST(Tractions, DISABLED_HalvesUnderALawThatIsRigidAtFirst) { pull_halves_apart({CohesiveShape::linear}); }
+
+/// Two disks hit each other, one of them cut by an interface: slowly, and so fast that it goes to pieces. The law
+/// stores what was given to it, and nothing where crack points have lost the material beside them.
+TEST(Tractions, AnInterfaceInDebrisKeepsItsEnergy) {
+  for (const double speed : {0.4, 4.0}) {  // of the disks against each other, over that of waves
+    Case c = soft_case(2, 25, 5);
+    c.time.cfl = 0.4;
+    c.materials[0].parameters = {{"shear_modulus", 385}, {"bulk_modulus", 833}};
+    add_body(c, Ball{Vec3(0.3537, 0.3613, 0), 0.2}, 0.5 * speed * Vec3(1, 0.6, 0));
+    add_body(c, Ball{Vec3(0.6441, 0.6329, 0), 0.2}, -0.5 * speed * Vec3(1, 0.8, 0));
+    add_crack(c, {Vec3(0.6441, 0.86, 0), Vec3(0.6441, 0.4, 0)}, CrackLaw::interface);
+    c.cracks[0].interface.opening = 1e6, c.cracks[0].interface.sliding = 3e5;
+    Simulation<2> simulation(c, MPI_COMM_SELF);
+    const Totals start = simulation.totals();
+    double worst = 0, stored = 0;
+    for (int i = 0; i < 350; ++i) {
+      simulation.step(1e300);
+      const Totals t = simulation.totals();
+      worst = std::max(worst, std::abs(t.energy() - start.energy())), stored = std::max(stored, t.crack_energy);
+    }
+    std::printf("disks at %.1f of the wave speed: stored at most %.4f, book off by %.4f of the kinetic energy\n", speed,
+                stored / start.kinetic, worst / start.kinetic);
+    EXPECT_GT(stored, 1e-4 * start.kinetic);
+    EXPECT_LE(stored, 0.1 * start.kinetic);
+    if (speed < 1) {
+      EXPECT_LE(worst, 0.01 * start.kinetic);  // in debris the line of the crack turns at random: docs/cracks.md
+    }
+  }
+}
 
 /// Perfect in both directions it is no crack; perfect along the normal it slips without opening.
 TEST(Tractions, PerfectDirectionsAreBound) {

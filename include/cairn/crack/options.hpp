@@ -31,7 +31,7 @@ struct CohesiveSpec {
   std::array<double, 2> strength = {0, 0};  // [Pa]
   std::array<double, 2> energy = {0, 0};    // G_c [J/m2]
   double peak = 0.1;                        // of a triangle: opening of the strength over the critical one
-  double exponent = 0;                      // of mixed modes; 0: they debond each for itself
+  double exponent = 1;                      // of mixed modes; 0: they debond each for itself
   std::array<double, 2> range = {0, std::numeric_limits<double>::infinity()};  // along the crack's line [m]
 };
 
