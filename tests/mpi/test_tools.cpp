@@ -70,7 +70,9 @@ void check_momentum(StressUpdate update, bool moving = false) {
     ASSERT_LE((now.momentum - before.momentum - given).norm(), 1e-12 * before.deformable_mass) << "step " << i;
     double work = 0;
     for (const ToolSum& sum : sums) work += sum.total[6];
-    if (!moving) ASSERT_NEAR(work, now.boundary_work, 1e-12 * now.kinetic);  // else changing gravity works too
+    if (!moving) {  // else changing gravity works too
+      ASSERT_NEAR(work, now.boundary_work, 1e-12 * now.kinetic);
+    }
     for (const ToolSum& sum : sums) largest = std::max(largest, std::abs(sum.last[0]) / before.deformable_mass);
     before = now;
   }
@@ -109,7 +111,9 @@ TEST(Tools, AreTheSameOnAnyNumberOfRanks) {
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   for (const Case& any : {c, moving_box<2>()}) {
     const auto alone = sums_after<2>(any, 60, MPI_COMM_SELF), together = sums_after<2>(any, 60, MPI_COMM_WORLD);
-    if (rank == 0) EXPECT_EQ(alone, together);
+    if (rank == 0) {
+      EXPECT_EQ(alone, together);
+    }
   }
 }
 

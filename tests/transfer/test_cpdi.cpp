@@ -78,7 +78,9 @@ void check_weights(double strain, double stretch) {
           const double far = at.x[d] - setup.lattice.node_position(d, node[d]);
           central *= std::max(0.0, 1 - std::abs(far) / setup.lattice.spacing()[d]);
           EXPECT_NEAR(w.slope[d], slope[d], 1e-11 / setup.lattice.smallest_spacing());
-          if (w.value != 0) EXPECT_NEAR(w.arm[d], -far, 1e-13);
+          if (w.value != 0) {
+            EXPECT_NEAR(w.arm[d], -far, 1e-13);
+          }
           for (int e = 0; e < Dim; ++e) gradient(e, d) += w.slope[d] * setup.lattice.node_position(e, node[e]);
           mean[d] += w.value * setup.lattice.node_position(d, node[d]);
           spread[d] += w.value * far * far;
@@ -182,7 +184,9 @@ void check_momentum() {
     if (Dim == 2) angular[2] -= density * at.volume0 * inertia[p][0] * at.spin[2];
   }
   EXPECT_LE(linear.norm(), 1e-12 * scale);
-  if (Dim == 2) EXPECT_NEAR(angular[2], 0, 1e-12 * scale);
+  if (Dim == 2) {
+    EXPECT_NEAR(angular[2], 0, 1e-12 * scale);
+  }
 }
 TEST(Cpdi, ProjectionKeepsMomentum) {
   check_momentum<2>();
