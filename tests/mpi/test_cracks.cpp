@@ -143,7 +143,7 @@ TEST(CracksOnRanks3D, AGrowingRim) {
   growth.criterion = GrowthCriterion::energy, growth.energy = 0.05;
   check_cracks<3>(c, 40, true);
 }
-TEST(CracksOnRanks3D, Laws) {
+TEST(SlowCracksOnRanks3D, Laws) {
   Case c = block_at_rest_3d();
   add_sheets(c, crossing_cracks(), CrackLaw::interface);
   for (CrackSpec& crack : c.cracks) crack.interface.opening = 1e6, crack.interface.sliding = 3e5;

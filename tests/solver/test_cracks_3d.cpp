@@ -129,7 +129,7 @@ TEST(Cracks3D, TensionDoesNotPassACrackAndCompressionDoes) {
 }
 
 /// A block on a crack plane of 30 degrees slides with x = g (sin - mu cos) t^2/2, and friction takes mu m g cos x.
-TEST(Cracks3D, ABlockSlidesAlongACrack) {
+TEST(SlowCracks3D, ABlockSlidesAlongACrack) {
   Case c = soft_case(3, 60, 10);
   c.domain.upper = Vec3(3, 1.2, 0.7), c.domain.cells = {30, 12, 7};
   c.domain.gravity = Vec3(10 * Vec3(0.5, -std::sqrt(0.75), 0));

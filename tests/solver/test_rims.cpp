@@ -83,13 +83,13 @@ PennyRim rim_of_penny() {
   return found;
 }
 
-TEST(Rims, StressIntensityOfAPennyShapedCrack) {
+TEST(SlowRims, StressIntensityOfAPennyShapedCrack) {
   const PennyRim found = rim_of_penny();
   EXPECT_NEAR(found.mean, 1, 0.06);
   EXPECT_LE(found.others, 0.05);
 }
 // Point by point it is .93 to 1.10: the rim is a staircase on the grid (docs/cracks.md).
-TEST(Rims, DISABLED_StressIntensityOfAPennyShapedCrackAllRound) {
+TEST(SlowRims, DISABLED_StressIntensityOfAPennyShapedCrackAllRound) {
   const PennyRim found = rim_of_penny();
   EXPECT_NEAR(found.lowest, 1, 0.06);
   EXPECT_NEAR(found.highest, 1, 0.06);
@@ -146,7 +146,7 @@ TEST(Rims, ACantileverBetweenRollersIsThatOf2D) {
 }
 
 /// Under tension across it a round crack grows round, in its plane, without holes.
-TEST(Rims, APennyShapedCrackGrowsRound) {
+TEST(SlowRims, APennyShapedCrackGrowsRound) {
   Case c = soft_case(3, 16, 8);
   c.domain.upper = Vec3(16, 16, 16);
   c.materials[0].model = "hypoelastic";

@@ -31,7 +31,7 @@ Case column(int height, double pull, double shift, CrackLaw law) {
 }
 
 /// delta = s (L/M + 1/D) for a stress s, in shear.
-TEST(Tractions3D, AnInterfaceGivesByItsStiffness) {
+TEST(SlowTractions3D, AnInterfaceGivesByItsStiffness) {
   const double M = 4e3, L = 10, D = M / 4;
   Case c = column(static_cast<int>(L), 0, 1e-4, CrackLaw::interface);
   c.cracks[0].interface.opening = c.cracks[0].interface.sliding = D;
@@ -51,7 +51,7 @@ TEST(Tractions3D, AnInterfaceGivesByItsStiffness) {
 }
 
 /// Halves pulled or shifted apart: what the crack took is G_c times its area, and the grips gave no more.
-TEST(Tractions3D, HalvesPulledApartTakeTheEnergyOfTheLaw) {
+TEST(SlowTractions3D, HalvesPulledApartTakeTheEnergyOfTheLaw) {
   for (const bool shear : {false, true})
     for (const auto shape : {CohesiveShape::triangle, CohesiveShape::exponential}) {
       const double M = shear ? 4e3 : soft_bulk + 4.0 / 3 * 4e3, L = 8, speed = 4e-4;
