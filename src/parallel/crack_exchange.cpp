@@ -11,12 +11,14 @@ namespace {
 
 constexpr double longest_segment = 1.0;  // cells
 
+constexpr double farthest = 1e9;  // cells, so that they can be counted
+
 /// The cell of a crack point in its patch's frame; the nearest, where there is a face of the domain.
 template <int Dim>
 Index<Dim> cell_of(const Lattice<Dim>& lattice, const Vec<Dim>& x) {
   Index<Dim> cell;
   for (int d = 0; d < Dim; ++d) {
-    cell[d] = static_cast<int>(std::floor(lattice.scaled(d, x[d])));
+    cell[d] = static_cast<int>(std::floor(std::clamp(lattice.scaled(d, x[d]), -farthest, farthest)));
     if (!lattice.periodic(d)) cell[d] = std::clamp(cell[d], 0, lattice.cells()[d] - 1);
   }
   return cell;
@@ -68,7 +70,7 @@ void divide_long_segments(Patch<Dim>& patch, const Lattice<Dim>& lattice) {
       middle.*vector = 0.5 * (a.*vector + b.*vector);
     middle.filled = a.filled && b.filled, middle.faces_filled = a.faces_filled & b.faces_filled;
     middle.bond = {}, middle.traction.setZero();
-    middle.own = patch.cells.contains(cell_of(lattice, middle.plane));
+    middle.own = holds(patch, lattice, middle);
     divided.push_back(middle);
   }
   if (divided.size() > patch.cracks.size()) patch.cracks = std::move(divided);
@@ -89,6 +91,11 @@ void take_triangles(CrackHeld<3>& point, const Message& message, std::size_t& at
 }
 
 }  // namespace
+
+template <int Dim>
+bool holds(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const CrackPoint<Dim>& point) {
+  return patch.cells.contains(cell_of(lattice, point.plane));
+}
 
 template <int Dim>
 void put_crack_point(const CrackPoint<Dim>& point, Message& message) {
@@ -133,7 +140,7 @@ std::string exchange_cracks(NeighbourExchange& messages, const PatchTable<Dim>& 
     for (const auto& point : patch.cracks) {
       if (!point.own) continue;
       CrackPoint<Dim> mine = point;
-      mine.own = patch.cells.contains(cell_of(lattice, point.plane));
+      mine.own = holds(patch, lattice, point);
       bool held = mine.own;
       if (mine.own || is_near(lattice, mine.plane, patch.cells)) kept.push_back(mine);
       for (const auto& link : patch.links) {
@@ -280,6 +287,8 @@ template std::string exchange_cracks(NeighbourExchange&, const PatchTable<2>&, s
 template std::string exchange_cracks(NeighbourExchange&, const PatchTable<3>&, std::vector<Patch<3>>&,
                                      const Lattice<3>&);
 
+template bool holds(const Patch<2>&, const Lattice<2>&, const CrackPoint<2>&);
+template bool holds(const Patch<3>&, const Lattice<3>&, const CrackPoint<3>&);
 template void put_crack_point(const CrackPoint<2>&, Message&);
 template void put_crack_point(const CrackPoint<3>&, Message&);
 template CrackPoint<2> take_crack_point(const Message&, std::size_t&);

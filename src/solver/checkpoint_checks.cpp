@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
 #include "cairn/io/checksum.hpp"
 #include "cairn/io/result_files.hpp"
+#include "cairn/parallel/crack_exchange.hpp"
 #include "cairn/parallel/migration.hpp"
+#include "checkpoint_columns.hpp"
 
 namespace cairn::checkpoint {
 namespace {
@@ -130,6 +133,40 @@ std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, s
   return sum.values[0] >= 0 ? "" : fmt::format("the contact of bodies {} and {} has a negative weight", a, b);
 }
 
+template <int Dim>
+std::string problem_of(const std::int32_t* numbers, const double* bond, const Crack& crack,
+                       const Lattice<Dim>& lattice) {
+  const auto wrong = [&](const char* what) {
+    return fmt::format("point {} of crack {} {}", numbers[crack_index], numbers[crack_of], what);
+  };
+  const auto is_within = [&](CrackNumber which, int least, int most) {
+    return numbers[which] >= least && numbers[which] <= most;
+  };
+  if (!is_within(crack_index, crack.ends[0], crack.ends[1])) return wrong("is none that the case has");
+  if (!is_within(crack_next, numbers[crack_index], crack.ends[1])) return wrong("is followed by one that there is not");
+  if (!is_within(crack_filled, 0, 1) || !is_within(crack_faces_filled, 0, 3) || !is_within(bond_state, 0, Bond::broken))
+    return wrong("is in a state that there is not");
+  for (int d = 0; d < image_components; ++d)
+    if (numbers[crack_image + d] != 0 && (d >= Dim || !lattice.periodic(d)))
+      return wrong("has crossed a boundary that is not periodic");
+  const bool good = std::all_of(bond, bond + bond_numbers, [](double x) { return std::isfinite(x) && x >= 0; });
+  return good ? "" : wrong("has a law that is not finite, or negative");
+}
+
+template <int Dim>
+std::string problem_of(const CrackPoint<Dim>& point, const Lattice<Dim>& lattice, const Patch<Dim>& patch) {
+  const auto wrong = [&](const char* what) {
+    return fmt::format("point {} of crack {} in patch {} {}", point.index, point.crack, patch.id, what);
+  };
+  for (const auto& vector : crack_vectors<Dim>)
+    if (!(point.*vector.value).allFinite()) return wrong("is not finite");
+  if (!holds(patch, lattice, point)) return wrong("does not lie there");
+  double size = 0;  // of the domain [m]
+  for (int d = 0; d < Dim; ++d) size = std::max({size, lattice.length(d), std::abs(lattice.lower()[d])});
+  const Vec<Dim> middle = 0.5 * point.lower + 0.5 * point.upper;
+  return (point.plane - middle).cwiseAbs().maxCoeff() <= 1e-9 * size ? "" : wrong("does not lie between its faces");
+}
+
 std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   Checksum sum;
   const auto add = [&]<class T>(const std::string& name, const T& value) {
@@ -146,9 +183,11 @@ std::uint64_t checksum_of(const RunState& state, const std::string& case_text) {
   return sum.value();
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                      \
-  template std::string problem_of(const Piece<Dim>&, const Lattice<Dim>&, PatchId); \
-  template std::string problem_of(std::pair<int, int>, const ContactSum<Dim>&, std::size_t, std::size_t);
+#define CAIRN_INSTANTIATE(Dim)                                                                            \
+  template std::string problem_of(const Piece<Dim>&, const Lattice<Dim>&, PatchId);                       \
+  template std::string problem_of(std::pair<int, int>, const ContactSum<Dim>&, std::size_t, std::size_t); \
+  template std::string problem_of(const std::int32_t*, const double*, const Crack&, const Lattice<Dim>&); \
+  template std::string problem_of(const CrackPoint<Dim>&, const Lattice<Dim>&, const Patch<Dim>&);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)
 #undef CAIRN_INSTANTIATE

@@ -27,6 +27,15 @@ template <int Dim>
 std::string problem_of(std::pair<int, int> bodies, const ContactSum<Dim>& sum, std::size_t body_count,
                        std::size_t partner_count);
 
+/// The numbers of a crack point, as the file holds them; `crack` is the one that it says to be of.
+template <int Dim>
+std::string problem_of(const std::int32_t* numbers, const double* bond, const Crack& crack,
+                       const Lattice<Dim>& lattice);
+
+/// A crack point: finite, in its patch, with its plane in the middle of its faces.
+template <int Dim>
+std::string problem_of(const CrackPoint<Dim>& point, const Lattice<Dim>& lattice, const Patch<Dim>& patch);
+
 /// Checksum of all that is no column of a patch: the numbers of the state, its index, and the case.
 std::uint64_t checksum_of(const RunState& state, const std::string& case_text);
 

@@ -58,8 +58,10 @@ inline constexpr CrackVector<Dim> crack_vectors[] = {{"crack_plane", &CrackPoint
                                                      {"crack_lower_velocity", &CrackPoint<Dim>::lower_velocity},
                                                      {"crack_upper_velocity", &CrackPoint<Dim>::upper_velocity},
                                                      {"crack_traction", &CrackPoint<Dim>::traction}};
-inline constexpr int crack_numbers = 9;  // crack, index, next, filled, faces_filled, state of the bond, image
-inline constexpr int bond_numbers = 4;   // length, peaks, dissipated
+/// Of a crack point the file holds nine integers, the last three its image, and four numbers of its bond.
+enum CrackNumber { crack_of, crack_index, crack_next, crack_filled, crack_faces_filled, bond_state, crack_image };
+inline constexpr int crack_numbers = crack_image + image_components;
+inline constexpr int bond_numbers = 4;                           // length, peaks, dissipated
 inline constexpr int held_numbers = 2 + 3 * CrackHeld<3>::most;  // in 3D: tip, triangles held, what they are
 inline constexpr const char* patch_cracks_name = "patch_cracks";
 /// Columns that a case with cracks has more.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <sstream>
@@ -82,7 +83,10 @@ void read_ledgers(ColumnReader<Dim>& in, const PatchList<Dim>& patches) {
     in.template read_patches<std::int64_t>(name);
   for (const auto& column : ledger_columns) {
     const auto values = in.template read_patches<double>(column.name);
-    for (std::size_t p = 0; p < patches.size(); ++p) patches[p]->ledger.*column.value = values[p];
+    for (std::size_t p = 0; p < patches.size(); ++p) {
+      patches[p]->ledger.*column.value = values[p];
+      in.require(std::isfinite(values[p]), fmt::format("its column {} is not finite", column.name));
+    }
   }
   in.settle();
 }
@@ -220,7 +224,7 @@ void read_triangles(ColumnReader<3>& in, const PatchList<3>& patches, const Layo
 
 template <int Dim>
 void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Layout& layout,
-                 const std::vector<Crack>& cracks) {
+                 const Lattice<Dim>& lattice, const std::vector<Crack>& cracks) {
   if (layout.cracks.empty()) return;
   in.template read_patches<std::int64_t>(patch_cracks_name);
   const auto numbers = in.template read<std::int32_t>("crack_numbers", crack_numbers, layout.cracks);
@@ -231,33 +235,35 @@ void read_cracks(ColumnReader<Dim>& in, const PatchList<Dim>& patches, const Lay
   for (std::size_t at = 0; at < patches.size(); ++at)
     for (std::int64_t i = 0; i < layout.cracks[layout.here[at]]; ++i, n += crack_numbers, bond += bond_numbers) {
       Patch<Dim>& patch = *patches[at];
+      if (n[crack_of] < 0 || n[crack_of] >= std::ssize(cracks)) {
+        in.require(false, fmt::format("it holds a point of crack {}; the case has {}", n[crack_of], cracks.size()));
+        continue;
+      }
+      const std::string problem = problem_of(n, bond, cracks[n[crack_of]], lattice);
+      in.require(problem.empty(), problem);
       CrackPoint<Dim> point;
-      point.crack = n[0], point.index = n[1], point.next = n[2], point.filled = n[3] != 0,
-      point.faces_filled = n[4] & 3;
-      point.bond = {n[5] == Bond::holds || n[5] == Bond::broken ? Bond::State{n[5]} : Bond::none,
-                    bond[0],
-                    {bond[1], bond[2]},
-                    bond[3]};
-      for (int d = 0; d < 3; ++d) point.image[d] = n[6 + d];
-      in.require(std::all_of(bond, bond + bond_numbers, [](double x) { return std::isfinite(x) && x >= 0; }),
-                 "it holds laws of crack points that are not finite");
-      const bool known =
-          n[0] >= 0 && n[0] < std::ssize(cracks) && n[1] >= cracks[n[0]].ends[0] && n[1] <= cracks[n[0]].ends[1];
-      in.require(known, fmt::format("it holds point {} of crack {}, which the case does not have", n[1], n[0]));
+      point.crack = n[crack_of], point.index = n[crack_index], point.next = n[crack_next];
+      point.filled = n[crack_filled] != 0, point.faces_filled = n[crack_faces_filled];
+      point.bond = {Bond::State{n[bond_state]}, bond[0], {bond[1], bond[2]}, bond[3]};
+      std::copy_n(n + crack_image, image_components, point.image.begin());
       in.require(patch.cracks.empty() || patch.cracks.back() < point,
                  fmt::format("the crack points of patch {} are not in their order", patch.id));
       patch.cracks.push_back(point);
     }
   if constexpr (Dim == 3) read_triangles(in, patches, layout, cracks);
+  in.settle();
   for (const auto& vector : crack_vectors<Dim>) {
     const auto values = in.template read<double>(vector.name, Dim, layout.cracks);
     const double* from = values.data();
     for (auto* patch : patches)
-      for (auto& point : patch->cracks) {
+      for (auto& point : patch->cracks)
         for (int d = 0; d < Dim; ++d) (point.*vector.value)[d] = *from++;
-        in.require((point.*vector.value).allFinite(), "it holds crack points that are not finite");
-      }
   }
+  for (const auto* patch : patches)
+    for (const auto& point : patch->cracks) {
+      const std::string problem = problem_of(point, lattice, *patch);
+      in.require(problem.empty(), problem);
+    }
   in.settle();
 }
 
@@ -381,7 +387,7 @@ void Checkpoint::fill(std::vector<Patch<Dim>>& patches, const Lattice<Dim>& latt
   read_contacts(in, held, layout, bodies.size());
   read_tools(in, held, layout, state_.tools.size() / tool_state_size);
   read_points(in, held, layout, states);
-  read_cracks(in, held, layout, cracks);
+  read_cracks(in, held, layout, lattice, cracks);
   check_points(in, held, lattice);
 }
 

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <set>
 
@@ -193,11 +195,25 @@ std::vector<double> Simulation<Dim>::pouring() const {
   return state;
 }
 
+/// \throws InputError on every rank where it is no state of the case's [[insert]], or further points would have the ids
+/// of those that are there
 template <int Dim>
 void Simulation<Dim>::restore_pouring(const std::vector<double>& state) {
-  next_id_ = state.empty() ? total_points_ : static_cast<std::int64_t>(state[0]);
-  for (std::size_t i = 0; i < poured_.size() && 3 * i + 3 < state.size(); ++i)
-    poured_[i] = {static_cast<int>(state[1 + 3 * i]), static_cast<int>(state[2 + 3 * i]), state[3 + 3 * i]};
+  const auto counts_up_to = [](double x, double most) { return x >= 0 && x <= most && x == std::floor(x); };
+  std::int64_t largest_id = -1;
+  for (const auto& patch : patches_)
+    for (const auto& piece : patch.pieces)
+      for (const std::int64_t id : piece.points.ids()) largest_id = std::max(largest_id, id);
+  MPI_Allreduce(MPI_IN_PLACE, &largest_id, 1, MPI_INT64_T, MPI_MAX, comm_);
+  bool whole = state.size() == 1 + 3 * poured_.size() && counts_up_to(state[0], 0x1p53) &&
+               largest_id < static_cast<std::int64_t>(state[0]);
+  for (std::size_t i = 0; whole && i < poured_.size(); ++i) {
+    const double* from = &state[1 + 3 * i];
+    whole = counts_up_to(from[0], pouring_.inserts[i].count) && counts_up_to(from[1], std::numeric_limits<int>::max());
+    if (whole) poured_[i] = {static_cast<int>(from[0]), static_cast<int>(from[1]), from[2]};
+  }
+  if (!whole) throw InputError("the checkpoint's [[insert]] are not those of the case");
+  next_id_ = static_cast<std::int64_t>(state[0]);
 }
 
 #define CAIRN_INSTANTIATE(Dim)                                   \

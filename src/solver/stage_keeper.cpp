@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "cairn/core/error.hpp"
 
 namespace cairn {
@@ -65,14 +67,16 @@ void apply_stage(Case& c, const RunStage& stage, double since) {
   c.time.cfl = by.time.cfl, c.time.dt = by.time.dt;
 }
 
-StageKeeper::StageKeeper(const Case& c, const std::vector<double>& state) : case_(c) {
-  if (state.size() < 1 + 2 * look_size) return;
+StageKeeper::StageKeeper(const Case& c, const RunState* from) : case_(c) {
+  if (!from) return;
   noted_ = true;
-  stage_ = static_cast<int>(state[0]);
-  if (stage_ < 0 || stage_ >= std::max<std::ptrdiff_t>(1, std::ssize(c.stages)) ||
-      std::ssize(state) != 1 + 2 * look_size + stage_)
+  const std::vector<double>& state = from->stage;
+  constexpr int least = 1 + 2 * look_size;  // numbers: the stage, and what was seen last
+  const std::ptrdiff_t stages = std::max<std::ptrdiff_t>(1, std::ssize(c.stages)), stage = std::ssize(state) - least;
+  if (stage < 0 || stage >= stages || state[0] != static_cast<double>(stage))
     throw InputError(
         "the checkpoint is of another stage than the case has; restore [[stage]], or run without --restart");
+  stage_ = static_cast<int>(stage);
   const double* at = &state[1];
   for (Look* look : {&of_run_, &of_stage_}) {
     look->since = at[0], look->time = at[1], look->rests = at[2];
@@ -80,7 +84,11 @@ StageKeeper::StageKeeper(const Case& c, const std::vector<double>& state) : case
     look->length = at[9];
     at += look_size;
   }
-  begun_.assign(at, &state[0] + state.size());
+  begun_.assign(at, state.data() + state.size());
+  const double now = from->step.time;
+  if (!of_run_.may_be_at(now) || !of_stage_.may_be_at(now) || !std::ranges::is_sorted(begun_) ||
+      (!begun_.empty() && !(begun_.front() >= 0 && begun_.back() <= now)))
+    throw InputError("the checkpoint's stages did not begin before now, one after the other");
 }
 
 std::vector<double> StageKeeper::state() const {

@@ -1,7 +1,7 @@
 #pragma once
 /// Where a run stands among its stages, and whether one ends.
 
-#include "cairn/solver/simulation.hpp"
+#include "cairn/solver/run_state.hpp"
 
 namespace cairn {
 
@@ -10,8 +10,9 @@ void apply_stage(Case& c, const RunStage& stage, double since);
 
 class StageKeeper {
  public:
-  /// \param state  of a checkpoint, or empty
-  StageKeeper(const Case& c, const std::vector<double>& state);
+  /// \param from  of a checkpoint, or null
+  /// \throws InputError where it is no state of the case's stages
+  StageKeeper(const Case& c, const RunState* from);
 
   /// The stage under way; 0 where the case has none.
   int stage() const { return stage_; }
@@ -42,6 +43,8 @@ class StageKeeper {
     double rests = 0;                          // looks in a row at which all was at rest
     std::array<double, 3> impulse{}, place{};  // of the tool then, and when the stage began
     double length = 0;                         // of the face from the opposite one when the stage began [m]
+
+    bool may_be_at(double now) const { return since >= 0 && since <= time && time <= now && rests >= 0; }
   };
   static constexpr int look_size = 10;
   template <int Dim>

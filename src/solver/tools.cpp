@@ -283,8 +283,10 @@ std::vector<double> Simulation<Dim>::tool_states() const {
 
 template <int Dim>
 void Simulation<Dim>::restore_tools(const std::vector<double>& states) {
-  for (std::size_t t = 0; t < tools_.size() && (t + 1) * tool_state_size <= states.size(); ++t)
-    tools_[t].restore(&states[t * tool_state_size]);
+  if (states.size() != tools_.size() * tool_state_size)
+    throw InputError(fmt::format("the checkpoint is of a case with {} tools (faces, drives and rigid bodies), not {}",
+                                 states.size() / tool_state_size, tools_.size()));
+  for (std::size_t t = 0; t < tools_.size(); ++t) tools_[t].restore(&states[t * tool_state_size]);
   set_velocities_of_tools();
   place_walls();
 }

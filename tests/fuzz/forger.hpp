@@ -5,6 +5,7 @@
 #include <random>
 #include <string>
 
+#include "../../src/solver/stage_keeper.hpp"
 #include "cairn/solver/checkpoint.hpp"
 #include "cairn/solver/simulation.hpp"
 
@@ -30,15 +31,30 @@ template <int Dim>
 struct Seed {
   Case spec;
   RunState state;
-  std::string bytes;  // of the checkpoint, its seal left out
+  std::filesystem::path file;  // the checkpoint
+  std::string bytes;           // of it, its seal left out
   std::uint64_t digest = 0;
 };
+/// \param name  of a case in tests/fuzz/seeds; empty: one of materials and contact alone
 template <int Dim>
-Seed<Dim> make_seed(const std::filesystem::path& scratch);
+Seed<Dim> make_seed(const std::filesystem::path& scratch, const std::string& name = {});
+
+/// A simulation among the stages of its case, as a run has it.
+template <int Dim>
+struct Resumed {
+  Case spec;  // as it is in the stage under way
+  StageKeeper stages;
+  Simulation<Dim> simulation;
+  Resumed(const Case& c, const Checkpoint* from);
+  void step();
+
+ private:
+  const Case& brought_up();
+};
 
 /// Checksum of all that a run goes on from.
 template <int Dim>
-std::uint64_t digest_of(const Simulation<Dim>& simulation, const RunState& state, const std::string& case_text);
+std::uint64_t digest_of(const Resumed<Dim>& run, const RunState& state, const std::string& case_text);
 
 /// What a form must lead to: an error; an error, or the state that was; anything but a crash.
 enum class Expectation { refused, unchanged, any };

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "../../src/solver/stage_keeper.hpp"
 #include "../support/cases.hpp"
 #include "cairn/core/error.hpp"
 #include "cairn/io/case_changes.hpp"
@@ -110,7 +111,8 @@ TEST(FaultsOnRanks, RunLeavesTheState) {
     Simulation<2> simulation(c, MPI_COMM_WORLD);
     simulation.step(1e300);
     RunState state;
-    state.step = simulation.step_state(), state.bodies = bodies_checksum(c);
+    note_simulation(simulation, state);
+    state.stage = StageKeeper(c, nullptr).state(), state.bodies = bodies_checksum(c);
     set_number(simulation, 150, PointColumns<2>::velocity, 1e8);  // a state that may be, but not for long
     write_checkpoint(out / "checkpoint_000000.h5", simulation, state, c.resolved);
     set_number(simulation, 150, PointColumns<2>::deformation, -1);  // one that may not

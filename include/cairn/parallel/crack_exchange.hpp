@@ -13,6 +13,10 @@ namespace cairn {
 /// them, and the segment beyond an open end. Patches have at least as many cells.
 inline constexpr double crack_reach = 4;
 
+/// Whether a patch's cells hold a crack point: in its frame, those nearest to what lies beyond a face of the domain.
+template <int Dim>
+bool holds(const Patch<Dim>& patch, const Lattice<Dim>& lattice, const CrackPoint<Dim>& point);
+
 /// Sends the patches' own crack points, which may have moved up to a patch, to the patches whose cells hold them now
 /// and to those nearby, where these are in the table. Lists become ascending; the same on any number of ranks.
 /// Collective. What went wrong on this rank, empty if nothing: a point that left the domain or moved further.

@@ -30,6 +30,15 @@ struct RunState {
   std::vector<double> tools;               // tool_state_size numbers for each: travel, velocity, spin, speed
 };
 
+/// Notes what a simulation is besides its patches. Collective.
+template <int Dim>
+void note_simulation(Simulation<Dim>& simulation, RunState& state) {
+  state.step = simulation.step_state();
+  state.tools = simulation.tool_states(), state.cracks = simulation.crack_states();
+  state.parts = simulation.parts(), state.spared = simulation.spared();
+  state.pouring = simulation.pouring();
+}
+
 /// Calls f(name, number) for every number of the state: doubles, std::int64_t and std::uint64_t. Time and step come
 /// first.
 template <class State, class F>
