@@ -9,7 +9,7 @@ import numpy as np
 
 from results import Frame, MissingData, Run
 
-LARGE = 8.0  # a body of so many times the median mass is a lid or a plate: lines end at its surface
+LARGE = 8.0  # a body of so many times the median mass is a lid or a plate: lines end at its surface, as at that of a driven body
 STRONG, WEAK = np.array((165, 15, 35)) / 255, np.array((125, 125, 125)) / 255
 WIDEST = 0.25  # of the mean diameter of grains: the width of the line of the largest force
 THINNEST = 0.03
@@ -57,6 +57,7 @@ def network(run: Run, contacts: Frame, frame: Frame) -> Network:
     period = np.zeros(3)
     period[: run.dimension] = (run.upper - run.lower) * run.periodic
     large = mass > LARGE * np.median(mass) if len(mass) else mass > 0
+    large = large | np.isin(bodies, run.driven_bodies)
     ends = []
     for side, there in zip(sides, known):
         at = np.minimum(np.searchsorted(bodies, side), max(len(bodies) - 1, 0))

@@ -22,7 +22,7 @@ SHOWN = re.compile(r"(?:[A-Z_]+=\S+ )*(cairn|mpirun|scripts/\S+|build/\S+|ctest|
 RUN = {"cairn", "mpirun", "scripts/plot", "scripts/measure", "scripts/view", "scripts/report", "scripts/export",
        "scripts/compare-runs"}
 NOT_RUN = {"scripts/quickstart", "scripts/test", "scripts/build", "scripts/bench", "scripts/validate", "scripts/check",
-           "scripts/readme-pictures", "scripts/paraview", "scripts/convert-cells", "scripts/convert-labels",
+           "scripts/readme-pictures", "scripts/sand", "scripts/paraview", "scripts/convert-cells", "scripts/convert-labels",
            "ctest", "cmake", "export", "git"}
 # A case for pages that only say case.toml, and results for those that start from some.
 ANY_CASE = {"time": "end = 1e-3\nsteps = 40", "output.checkpoint": "{ every = 10 }"}

@@ -173,7 +173,8 @@ def test_camera(cairn: Program, scratch: Path) -> None:
 
 def test_images(cairn: Program, scratch: Path) -> None:
     """A contact across a periodic boundary is drawn at both sides, and lines have their shortest way."""
-    run = types.SimpleNamespace(dimension=2, lower=np.zeros(2), upper=np.ones(2), periodic=np.array([False, True]))
+    run = types.SimpleNamespace(dimension=2, lower=np.zeros(2), upper=np.ones(2), periodic=np.array([False, True]),
+                                driven_bodies=np.array([], int))
     table = {"body": np.array([5, 2]), "centre": np.array([[0.5, 0.95, 0], [0.5, 0.1, 0]]), "mass": np.ones(2)}
     run.grain_files, run.file_at = [], lambda tables, time: types.SimpleNamespace(field=table.__getitem__)
     rows = {"body_a": np.array([2]), "body_b": np.array([5]), "point": np.array([[0.5, 0.02, 0]]),

@@ -418,6 +418,25 @@ output = {{ history = {{ every = 1 }}, particles = {{ every = 3 }} }}
     expect_code(cairn("run", here / "again" / "case.toml", "--out", here / "run1", "--overwrite"), 2, "was not written by cairn")
 
 
+def test_from_a_scan_to_pictures(cairn, here):
+    """scripts/sand, small: grains keep their volumes, and 1 and 3 ranks give the same bits."""
+    if not has_scipy():
+        return print("labels: skipped, scipy is not there")
+    command = [ROOT / "scripts" / "sand", here / "sand", "--program", cairn.exe, "--grains", "8", "--voxels", "24", "--cells", "8",
+               "--steps", "4", "--ranks", "1", "--page-only"]
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=400 * PATIENCE, check=False)
+    expect(done.returncode == 0, f"{done.returncode} {done.stdout} {done.stderr}")
+    run = here / "sand" / "run"
+    expect((run / "view.html").stat().st_size > 10000, "view.html")
+    with h5py.File(run / "particles_000000.vtkhdf") as file, h5py.File(here / "sand" / "grains.h5") as labels:
+        body, room, counts = file["body"][()], file["volume"][()], labels["count"][()]
+        for i, count in enumerate(counts, 1):  # body 0 is the lid
+            share = room[body == i].sum() / (count * (1e-3 / 24) ** 3)
+            expect(abs(share - 1) < 0.01, f"grain {i}: {share} of the volume of its voxels")
+    expect_code(cairn("run", here / "sand" / "sand.toml", "--out", here / "three", ranks=3), 0)
+    expect(compare_folders(run, here / "three"), "3 ranks differ")
+
+
 def main() -> int:
     return run_tests(globals(), Program(sys.argv[1]), fresh_folder(sys.argv[2]))
 

@@ -25,17 +25,17 @@ struct Voxels {
   LabelVolume volume(int dimension, std::vector<std::int64_t> known, double weight = 1) {
     std::vector<LabelFacts> facts;
     for (const auto label : known) facts.push_back({label, std::ranges::count(labels, label), {}, {}, 1, weight});
-    return {dimension, size, Vec3::Zero(), Vec3::Ones(), facts, [this](const auto& low, const auto& n, auto to, auto deep) {
-              largest = std::max(largest, to.size());
-              std::size_t i = 0;
-              for (std::int64_t z = low[2]; z < low[2] + n[2]; ++z)
-                for (std::int64_t y = low[1]; y < low[1] + n[1]; ++y)
-                  for (std::int64_t x = low[0]; x < low[0] + n[0]; ++x)
-                    {
-                      const auto at = static_cast<std::size_t>((z * size[1] + y) * size[0] + x);
-                      to[i] = labels.at(at), deep[i] = depth.empty() ? 100 : depth.at(at), ++i;
-                    }
-            }};
+    return {
+        dimension, size, Vec3::Zero(), Vec3::Ones(), facts, [this](const auto& low, const auto& n, auto to, auto deep) {
+          largest = std::max(largest, to.size());
+          std::size_t i = 0;
+          for (std::int64_t z = low[2]; z < low[2] + n[2]; ++z)
+            for (std::int64_t y = low[1]; y < low[1] + n[1]; ++y)
+              for (std::int64_t x = low[0]; x < low[0] + n[0]; ++x) {
+                const auto at = static_cast<std::size_t>((z * size[1] + y) * size[0] + x);
+                to[i] = labels.at(at), deep[i] = depth.empty() ? 100 : depth.at(at), ++i;
+              }
+        }};
   }
 };
 

@@ -1,9 +1,10 @@
 #pragma once
 /// Images and volumes of labels (docs/shapes.md). Each voxel has a label and a depth, how far its middle lies below the
-/// surface of its label's body. A place belongs to the label with the largest sum of weight times depth over the middles of
-/// voxels around it, linear between them: between two bodies, or a body and void, that is where the interpolated signed
-/// distance is zero. Each place has one owner, so that touching bodies leave no gap and do not overlap, and the middle of a
-/// voxel is its own label's. Depths, and the weights that keep the volumes, are found by whoever made the file.
+/// surface of its label's body. A place belongs to the label with the largest sum of weight times depth over the
+/// middles of voxels around it, linear between them: between two bodies, or a body and void, that is where the
+/// interpolated signed distance is zero. Each place has one owner, so that touching bodies leave no gap and do not
+/// overlap, and the middle of a voxel is its own label's. Depths, and the weights that keep the volumes, are found by
+/// whoever made the file.
 
 #include <array>
 #include <cstdint>
@@ -26,8 +27,8 @@ struct LabelFacts {
   double weight = 1;
 };
 
-/// The voxels of a box, x fastest, from the file: its lower corner, its sizes, and room for their labels and depths (above
-/// 0, in any unit).
+/// The voxels of a box, x fastest, from the file: its lower corner, its sizes, and room for their labels and depths
+/// (above 0, in any unit).
 using VoxelSource =
     std::function<void(const std::array<std::int64_t, 3>& lower, const std::array<std::int64_t, 3>& size,
                        std::span<std::int64_t> labels, std::span<std::uint8_t> depths)>;
