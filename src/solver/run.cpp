@@ -386,7 +386,7 @@ class Run {
 template <int Dim>
 int run(Case& c, const RunSettings& settings, MPI_Comm comm) {
   auto from = open_restart(c, settings, comm);
-  StageKeeper stages(c, from ? from->state().stage : std::vector<double>());
+  StageKeeper stages(c, from ? &from->state() : nullptr);
   stages.bring_up(c);
   Run<Dim> work(c, stages, settings, comm, from.get());
   from.reset();  // its file is open no longer than needed
