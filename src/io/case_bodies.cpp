@@ -260,13 +260,13 @@ void check_pressures(const Draft& draft, Errors& errors) {
   int reported = 0;
   for (int i = 0; i < std::ssize(c.bodies) && reported < most_pressure_errors; ++i) {
     const BodySpec& body = c.bodies[i];
-    if (body.initial_pressure == 0 || body.material < 0 || body.material >= std::ssize(c.materials)) continue;
-    const Material& material = c.materials[body.material];
-    const LawInfo* law = find_law(material.model);
+    const Material* material = material_of(c, body);
+    if (body.initial_pressure == 0 || !material) continue;
+    const LawInfo* law = find_law(material->model);
     std::string problem;
     if (law && !law->has_pressure)
       problem = fmt::format("the model {} of the body's material carries no stress", in_quotes(law->name));
-    else if (material.plane == Plane::stress)
+    else if (material->plane == Plane::stress)
       problem = "the body's material is in plane stress, which a hydrostatic pressure is not";
     if (problem.empty()) continue;
     errors.add({body.source, 0}, "initial_pressure", problem + "; remove this key or set it to 0");

@@ -278,9 +278,14 @@ bool holds_point(const Shape& shape, const Vec3& shift, const Case& c, std::int6
 
 }  // namespace
 
+const Material* material_of(const Case& c, const BodySpec& body) {
+  return body.material >= 0 && body.material < std::ssize(c.materials) ? &c.materials[body.material] : nullptr;
+}
+
 bool is_prescribed(const Case& c, int index) {
   const BodySpec& body = c.bodies[index];
-  return c.materials[body.material].model == "rigid" ||
+  const Material* material = material_of(c, body);
+  return (material && material->model == "rigid") ||
          std::ranges::any_of(c.drives, [&](const Drive& d) { return selects(d, body, index, c.domain); });
 }
 

@@ -117,14 +117,14 @@ void check_hoop_materials(Table& table, const Case& c, const CrackSpec& crack) {
   const bool turns = crack.growth.direction == GrowthDirection::hoop;
   if (crack.growth.criterion == GrowthCriterion::none || !(turns || by_intensity)) return;
   for (int b = 0; b < std::ssize(c.bodies); ++b) {
-    const Material& material = c.materials[c.bodies[b].material];
-    if (!crack.cuts(b, c.bodies[b].group) || is_prescribed(c, b)) continue;
-    if (material.model == "hypoelastic" || material.model == "neo_hookean") continue;
+    const Material* material = material_of(c, c.bodies[b]);
+    if (!material || !crack.cuts(b, c.bodies[b].group) || is_prescribed(c, b)) continue;
+    if (material->model == "hypoelastic" || material->model == "neo_hookean") continue;
     return table.error("",
                        fmt::format("{}: growth by hoop stress needs stress intensities, which the model {} of body {} "
                                    "has not; use hypoelastic or neo_hookean, or criterion = \"energy\" with "
                                    "direction = \"straight\"",
-                                   crack.source, in_quotes(material.model), b));
+                                   crack.source, in_quotes(material->model), b));
   }
 }
 

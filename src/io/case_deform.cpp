@@ -47,8 +47,11 @@ void refuse_others(Table& deform, const Case& c) {
     if (there) deform.error("", fmt::format("{} cannot be in a domain that deforms", what));
   };
   refuse(!c.drives.empty(), "driven bodies");
-  refuse(std::ranges::any_of(c.bodies, [&](const BodySpec& b) { return c.materials[b.material].model == "rigid"; }),
-         "rigid bodies");
+  const auto is_rigid = [&](const BodySpec& b) {
+    const Material* material = material_of(c, b);
+    return material && material->model == "rigid";
+  };
+  refuse(std::ranges::any_of(c.bodies, is_rigid), "rigid bodies");
   refuse(!c.cracks.empty(), "cracks");
   refuse(!c.inserts.empty(), "bodies that come later ([[insert]])");
   refuse(c.solver.shape == ShapeFunction::cpdi, "points with solver.shape = \"cpdi\"");

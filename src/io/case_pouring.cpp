@@ -121,8 +121,8 @@ void read_pouring(Table& root, Draft& draft, Errors& errors) {
     insert.count = static_cast<int>(c.bodies.size()) - insert.first;
     for (std::size_t b = insert.first; b < c.bodies.size(); ++b) {
       c.bodies[b].insert = static_cast<int>(c.inserts.size());
-      const int m = c.bodies[b].material;
-      if (m < std::ssize(c.materials) && c.materials[m].model == "rigid") {
+      const Material* material = material_of(c, c.bodies[b]);
+      if (material && material->model == "rigid") {
         table.error("material",
                     "is rigid; bodies that come later must be deformable: a drive moves those that are not");
         break;

@@ -147,6 +147,8 @@ void check_walls(const Case& c, Errors& errors);
 /// A body that gets no material point is an error.
 void check_points(const Case& c, Errors& errors);
 
+/// A body's material; null after an error in it.
+const Material* material_of(const Case& c, const BodySpec& body);
 /// Moves as prescribed, whatever the faces do.
 bool is_prescribed(const Case& c, int index);
 /// Refuses a fixed time step in which a wave or a point crosses more than a cell, and warns of one that nearly does.

@@ -142,6 +142,7 @@ TEST_F(CaseFile, DomainsThatCannotDeformAreRefused) {
   refused(with("{}"), "give x, y or z");
   refused(replaced(deforming, "[time]", "gravity = [0.0, -9.81]\n[time]"), "no bottom");
   refused(deforming + "[solver]\nshape = \"cpdi\"\n", "cpdi");
+  refused(replaced(deforming, "material = \"soft\"", "material = \"hard\""), "hard");
   refused(deforming + "[[drive]]\nids = [0]\nvelocity = [1.0, 0.0]\n", "driven bodies");
   refused(deforming + "[[cracks]]\npoints = [[0.2, 0.5], [0.5, 0.5]]\n", "cracks");
   refused(base + "[[stage]]\nuntil = { strain = 0.1, of = \"domain\" }\n", "domain");

@@ -398,7 +398,7 @@ class Simulation {
   std::vector<Body> bodies_;
   std::vector<Tool> tools_;
   std::vector<int> moved_bodies_;  // of tools whose velocity changes
-  bool pushed_tools_ = false;  // there are pistons or rotors
+  bool pushed_tools_ = false;      // there are pistons or rotors
   Case pouring_;  // of the case, what placing a body asks for, and the bodies that come; elsewhere nothing
   struct Pouring {
     int placed = 0, drawn = 0;

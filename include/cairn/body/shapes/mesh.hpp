@@ -13,7 +13,7 @@ struct Mesh : FromFile {
   std::string solid;                      // its name, or "#N" by its number from 0; empty: all that the file holds
   double holes = 0;                       // the largest that is closed [m]
   std::shared_ptr<const Solid> inside{};  // in the file's lengths
-  std::size_t count = 0;  // of solids, while it stands for each of them
+  std::size_t count = 0;                  // of solids, while it stands for each of them
 
   template <class Self, class Keys>
   static void list(Self& s, Keys&& keys) {

@@ -12,7 +12,7 @@ struct Outline : FromFile {
 
   std::string line;                      // its name, or "#N" by its number from 0; empty: all that the file holds
   std::shared_ptr<const Loops> loops{};  // in the file's lengths
-  std::size_t count = 0;  // of lines, while it stands for each of them
+  std::size_t count = 0;                 // of lines, while it stands for each of them
 
   template <class Self, class Keys>
   static void list(Self& s, Keys&& keys) {
