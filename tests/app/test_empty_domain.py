@@ -3,6 +3,7 @@
     test_empty_domain.py CAIRN SCRATCH
 """
 
+import csv
 import os
 import subprocess
 import sys
@@ -48,7 +49,9 @@ imbalance = 1.0
 SMALL = {2: 512, 3: 128}
 LARGE = {2: 1_000_000, 3: 10_000}
 # A checkpoint knows its case and how many patches there is room for, and with that its numbers and their checksum.
-OF_DOMAIN = ("/case", "numbers_checksum", "attribute patches", "patch_id", "checksums")
+OF_DOMAIN = ("/case", "numbers_checksum", "attribute patches", "patch_id", "checksums", "attribute upper_",
+             "attribute history_")
+COLUMNS_OF_DOMAIN = ("length_", "stress_")  # of history.csv: how large it is, and means over it
 
 
 def case(scratch: Path, dim: int, cells: int, far: bool = False) -> Path:
@@ -71,11 +74,24 @@ def measured(cairn: Program, *arguments) -> tuple[int, float, float]:
     return os.waitstatus_to_exitcode(status), time.monotonic() - began, usage.ru_maxrss / 1e3
 
 
+def history_differs(a: Path, b: Path) -> list[str]:
+    """Rows of history.csv that differ in more than what is of the domain."""
+    rows = [list(csv.DictReader(file.open(encoding="utf-8"))) for file in (a, b)]
+    lines = [f"{len(rows[0])} and {len(rows[1])} rows"] * (len(rows[0]) != len(rows[1]))
+    for one, two in zip(*rows):
+        lines += [f"{key}: {one[key]} and {two[key]}" for key in one
+                  if not key.startswith(COLUMNS_OF_DOMAIN) and one[key] != two[key]]
+    return lines
+
+
 def compare(a: Path, b: Path, same_domain: bool) -> list[str]:
     names = compare_runs.result_files(a)
     lines = [f"files {names ^ compare_runs.result_files(b)}"] * (names != compare_runs.result_files(b))
     for name in sorted(names):
         if not same_domain and name == "case.toml":
+            continue
+        if not same_domain and name == "history.csv":
+            lines += [f"{name}: {line}" for line in history_differs(a / name, b / name)]
             continue
         lines += [f"{name}: {line}" for line in compare_runs.compare_files(a / name, b / name)
                   if same_domain or not any(word in line for word in OF_DOMAIN)]
