@@ -7,48 +7,10 @@
 #include <iterator>
 
 #include "cairn/material/registry.hpp"
-#include "case_names.hpp"
-#include "case_sections.hpp"
+#include "case_writer.hpp"
 
 namespace cairn::reading {
 namespace {
-
-/// The shortest text that reads back to the same bits, always as a TOML float.
-std::string text_of(double value) {
-  std::string text = fmt::format("{}", value);
-  if (std::isfinite(value) && text.find_first_of(".e") == std::string::npos) text += ".0";
-  return text;
-}
-std::string text_of(bool value) { return value ? "true" : "false"; }
-std::string text_of(std::int64_t value) { return std::to_string(value); }
-std::string text_of(int value) { return std::to_string(value); }
-std::string text_of(std::string_view value) {
-  std::string text = "\"";
-  for (const char c : value) {
-    const auto code = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      text += {'\\', c};
-    } else if (code < 32 || code == 127) {
-      text += fmt::format("\\u{:04X}", code);
-    } else {
-      text += c;
-    }
-  }
-  return text + '"';
-}
-
-/// [a, b, c] of the first `size` entries.
-template <class List>
-std::string list_of(const List& values, std::ptrdiff_t size) {
-  std::string text = "[";
-  for (std::ptrdiff_t i = 0; i < size; ++i) text += (i ? ", " : "") + text_of(values[i]);
-  return text + "]";
-}
-
-std::string key_of(std::string_view name) {
-  const auto bare = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; };
-  return !name.empty() && std::ranges::all_of(name, bare) ? std::string(name) : text_of(name);
-}
 
 /// Writes the keys of a shape; the dimension decides the length of vectors.
 struct KeyWriter {
@@ -96,91 +58,6 @@ std::string shape_text(const Shape& shape, int dim) {
 }
 
 namespace {
-
-class Writer {
- public:
-  explicit Writer(int dimension) : dim_(dimension) {}
-  void section(std::string_view header) { text_ += fmt::format("\n{}\n", header); }
-  template <class T>
-  void key(std::string_view name, const T& value) {
-    raw(name, text_of(value));
-  }
-  void raw(std::string_view name, std::string_view value) { text_ += fmt::format("{} = {}\n", name, value); }
-  void vector(std::string_view name, const Vec3& v) { raw(name, list_of(v, dim_)); }
-  void spin(const Vec3& w) { raw("angular_velocity", dim_ == 3 ? list_of(w, 3) : text_of(w.z())); }
-  void motion(const Vec3& v, const Vec3& w) {
-    vector("velocity", v);
-    spin(w);
-  }
-  /// The `size` components from `first` on, a number where it is one; with rows of times or formulas where they change.
-  static std::string table_of(const MotionTable& table, int first, int size) {
-    std::string text;
-    if (!table.formulas.empty()) {
-      for (int k = first; k < first + size; ++k) text += (k > first ? ", " : "") + text_of(table.formulas[k].text());
-      return size == 1 ? text : "[" + text + "]";
-    }
-    if (!table.varies()) {
-      const Vec3 v = table.values.front();
-      return size == 1 ? text_of(v[first]) : list_of(v, size);
-    }
-    for (std::size_t i = 0; i < table.times.size(); ++i) {
-      text += fmt::format("{}[{}", i ? ", " : "", text_of(table.times[i]));
-      for (int k = first; k < first + size; ++k) text += ", " + text_of(table.values[i][k]);
-      text += "]";
-    }
-    return "[" + text + "]";
-  }
-  /// `along` is not given for walls. Nothing where there is no piston.
-  std::string piston_of(const Piston& p, bool along) const {
-    if (p.mass == 0) return {};
-    std::string text = fmt::format("{} = {{ {} = {}", p.gain > 0 ? "servo" : "piston",
-                                   p.pressure ? "pressure" : "force", table_of(p.force, 0, 1));
-    if (p.force.repeat) text += ", repeat = true";
-    if (p.area > 0) text += ", area = " + text_of(p.area);
-    if (along) text += ", along = " + list_of(p.along, dim_);
-    text += p.gain > 0 ? fmt::format(", gain = {}, largest = {}", text_of(p.gain), text_of(p.largest))
-                       : fmt::format(", mass = {}, damping = {}", text_of(p.mass), text_of(p.damping));
-    return text + " }";
-  }
-  std::string rotor_of(const Piston& r) const {
-    return fmt::format("rotor = {{ inertia = {}, moment = {}{}, damping = {}{} }}", text_of(r.mass),
-                       table_of(r.force, 0, 1), r.force.repeat ? ", repeat = true" : "", text_of(r.damping),
-                       dim_ == 3 ? ", axis = " + list_of(r.along, 3) : "");
-  }
-  void drive(const Drive& d) {
-    raw("velocity", table_of(d.velocity, 0, dim_));
-    raw("angular_velocity", table_of(d.angular_velocity, dim_ == 3 ? 0 : 2, dim_ == 3 ? 3 : 1));
-    if (d.velocity.repeat || d.angular_velocity.repeat) key("repeat", true);
-    if (d.about) vector("about", *d.about);
-    if (d.piston.mass > 0) text_ += piston_of(d.piston, true) + "\n";
-    if (d.rotor.mass > 0) text_ += rotor_of(d.rotor) + "\n";
-  }
-  void face(std::string_view name, const Face& f) {
-    std::string text = fmt::format("{{ type = \"{}\"", name_of(face_type_names, f.type));
-    if (f.type == FaceType::fixed || f.type == FaceType::wall) text += ", velocity = " + table_of(f.velocity, 0, dim_);
-    if (f.velocity.repeat) text += ", repeat = true";
-    if (f.type == FaceType::free) text += fmt::format(", leaving = \"{}\"", name_of(leaving_names, f.leaving));
-    if (f.type == FaceType::wall) text += ", friction = " + text_of(f.friction);
-    if (f.position) text += ", position = " + text_of(*f.position);
-    if (f.piston.mass > 0) text += ", " + piston_of(f.piston, false);
-    raw(name, text + " }");
-  }
-  void axis(std::string_view name, const AxisDeformation& a) {
-    const bool stress = a.by == AxisDeformation::By::stress;
-    std::string text = fmt::format("{{ {} = {}", stress ? "stress" : "strain_rate", table_of(a.target, 0, 1));
-    if (a.target.repeat) text += ", repeat = true";
-    if (stress)
-      text += fmt::format(", viscosity = {}, memory = {}, largest_rate = {}", text_of(a.viscosity), text_of(a.memory),
-                          text_of(a.largest_rate));
-    raw(name, text + " }");
-  }
-  void text(std::string_view lines) { text_ += lines; }
-  std::string take() { return std::move(text_); }
-
- private:
-  int dim_;
-  std::string text_;
-};
 
 void write_domain(Writer& out, const Domain& d) {
   out.section("[domain]");
@@ -317,72 +194,6 @@ void write_bodies(Writer& out, const Draft& draft) {
     }
     out.drive(drive);
   }
-}
-
-std::string text_or_perfect(double stiffness) { return text_of(std::isfinite(stiffness) ? stiffness : -1.0); }
-
-void write_growth(Writer& out, const GrowthSpec& growth, bool of_surface) {
-  std::string text = fmt::format("{{ criterion = \"{}\"", name_of(growth_criterion_names, growth.criterion));
-  if (growth.criterion == GrowthCriterion::hoop) text += ", toughness = " + text_of(growth.toughness);
-  if (growth.criterion != GrowthCriterion::hoop) text += ", energy = " + text_of(growth.energy);
-  if (growth.criterion == GrowthCriterion::steady)
-    text += fmt::format(", speed = {}, start = {}", text_of(growth.speed), text_of(growth.start));
-  text += fmt::format(", direction = \"{}\"", name_of(growth_direction_names, growth.direction));
-  if (!of_surface) text += ", most = " + text_of(growth.most);
-  text += fmt::format(", length = {}, every = {}", text_of(growth.length), growth.every);
-  if (!of_surface) text += fmt::format(", cohesive = {}", growth.cohesive);
-  text += " }";
-  out.raw("growth", text);
-}
-
-void write_crack_law(Writer& out, const CrackSpec& crack) {
-  if (crack.law == CrackLaw::friction || crack.law == CrackLaw::cohesive) out.key("friction", crack.friction);
-  if (crack.law == CrackLaw::interface) {
-    out.raw("normal_stiffness", text_or_perfect(crack.interface.opening));
-    out.raw("closing_stiffness", text_or_perfect(crack.interface.closing));
-    out.raw("tangential_stiffness", text_or_perfect(crack.interface.sliding));
-  }
-  if (crack.law == CrackLaw::cohesive || crack.growth.cohesive) {
-    const CohesiveSpec& law = crack.cohesive;
-    std::string text =
-        fmt::format("{{ shape = \"{}\", strength = {}, energy = {}", name_of(cohesive_shape_names, law.shape),
-                    list_of(law.strength, 2), list_of(law.energy, 2));
-    if (law.shape == CohesiveShape::triangle) text += ", peak = " + text_of(law.peak);
-    text += ", exponent = " + text_of(law.exponent);
-    if (!crack.is_surface()) text += fmt::format(", from = {}, to = {}", text_of(law.range[0]), text_of(law.range[1]));
-    out.raw("cohesive", text + " }");
-  }
-  if (crack.growth.criterion != GrowthCriterion::none) write_growth(out, crack.growth, crack.is_surface());
-}
-
-/// Where a crack lies.
-void write_crack_place(Writer& out, const CrackSpec& crack, int dimension) {
-  std::string points;
-  for (const Vec3& x : crack.points) points += (points.empty() ? "" : ", ") + list_of(x, dimension);
-  if (!points.empty()) out.raw("points", "[" + points + "]");
-  if (dimension == 2)
-    out.raw("ends", fmt::format("[\"{}\", \"{}\"]", name_of(crack_end_names, crack.ends[0]),
-                                name_of(crack_end_names, crack.ends[1])));
-  if (dimension == 3 && !points.empty()) out.raw("extrude", list_of(crack.extrude, 3));
-  if (crack.disk)
-    out.raw("disk", fmt::format("{{ centre = {}, normal = {}, radius = {} }}", list_of(crack.disk->centre, 3),
-                                list_of(crack.disk->normal, 3), text_of(crack.disk->radius)));
-  if (crack.file) out.raw("triangles", text_of(crack.file->name)), out.key("scale", crack.file->scale);
-}
-
-void write_cracks(Writer& out, const Case& c) {
-  for (const auto& crack : c.cracks) {
-    out.section("[[cracks]]");
-    write_crack_place(out, crack, c.domain.dimension);
-    out.key("law", name_of(crack_law_names, crack.law));
-    write_crack_law(out, crack);
-    if (!crack.groups.empty()) out.raw("bodies", list_of(crack.groups, std::ssize(crack.groups)));
-    if (!crack.ids.empty()) out.raw("ids", list_of(crack.ids, std::ssize(crack.ids)));
-  }
-  if (c.cracks.empty()) return;
-  out.section("[crack]");
-  out.raw("j_radius", list_of(c.crack.j_radius, 2));
-  out.key("split", c.crack.split);
 }
 
 void write_boundary(Writer& out, const Case& c) {

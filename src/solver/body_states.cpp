@@ -4,6 +4,8 @@
 #include <cmath>
 #include <map>
 
+#include "cairn/body/deformation.hpp"
+
 namespace cairn {
 namespace {
 
@@ -69,9 +71,8 @@ Moments moments_of(const Simulation<Dim>& simulation, const Piece<Dim>& piece) {
       r[d] = points.column(d)[p] + points.images()[p][d] * simulation.lattice().length(d) - origin[d];
       v[d] = points.column(C::velocity + d)[p];
     }
-    Tensor<Dim, double> F;
-    for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
-    const double volume0 = points.column(C::volume)[p], mass = density * volume0, volume = volume0 * determinant(F);
+    const double volume0 = points.column(C::volume)[p], mass = density * volume0,
+                 volume = volume0 * volume_ratio(points, p);
     const Vec3 spin = r.cross(v);
     double* m = sums.m.data();
     m[0] += mass, m[26] += 1, m[27] += mass * std::pow(volume, 2.0 / Dim) / 12;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "cairn/body/deformation.hpp"
 #include "cairn/io/checksum.hpp"
 #include "cairn/io/result_files.hpp"
 #include "cairn/parallel/crack_exchange.hpp"
@@ -108,10 +109,8 @@ std::string problem_of(const Piece<Dim>& piece, const Lattice<Dim>& lattice, Pat
     for (int p = 0; p < points.size(); ++p)
       if (!std::isfinite(points.column(c)[p])) return wrong(p, "has a value that is not finite");
   for (int p = 0; p < points.size(); ++p) {
-    Tensor<Dim, double> F;
-    for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
     if (!(points.column(C::volume)[p] > 0)) return wrong(p, "has no volume");
-    if (!(determinant(F) > 0)) return wrong(p, "is inverted");
+    if (!(volume_ratio(points, p) > 0)) return wrong(p, "is inverted");
     if (points.ids()[p] < 0) return wrong(p, "has a negative number");
     for (int d = 0; d < static_cast<int>(points.images()[p].size()); ++d)
       if (points.images()[p][d] != 0 && (d >= Dim || !lattice.periodic(d)))

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "cairn/body/deformation.hpp"
 #include "cairn/core/error.hpp"
 #include "cairn/parallel/patch_sums.hpp"
 #include "cairn/solver/simulation.hpp"
@@ -24,13 +25,6 @@ Vec<Dim> stretches(const Vec<Dim>& strain) {
   Vec<Dim> stretch;
   for (int d = 0; d < Dim; ++d) stretch[d] = F.c[tensor_index<Dim>(d, d)];
   return stretch;
-}
-
-template <int Dim>
-double volume_ratio(const Points<Dim>& points, int p) {
-  Tensor<Dim, double> F;
-  for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(PointColumns<Dim>::deformation + i)[p];
-  return determinant(F);
 }
 
 /// Half the work of a strain on a piece's points, by the stress that they have now [J].
@@ -137,13 +131,13 @@ void Simulation<Dim>::deform_by(const Vec<Dim>& strain) {
   const Vec<Dim> factor = stretches(strain), logarithmic = factor.array().log().matrix().eval();
   const Lattice<Dim> before = lattice_;
   place_corner(lattice_.lower() + (lattice_.upper() - lattice_.lower()).cwiseProduct(factor));
-  SpeedLimits speeds;
+  SpeedLimits unused;  // the next step's stresses see to it
   for (auto& patch : patches_)
     for (auto& piece : patch.pieces) {
       const SolverMaterial& material = material_of(piece);
       double work = carry(piece.points, before, lattice_, factor, material.density);
       work += half_work(piece.points, logarithmic);
-      strain_alike(piece, material.law, material.density, strain, dt_, speeds);
+      strain_alike(piece, material.law, material.density, strain, dt_, unused);
       work += half_work(piece.points, logarithmic);
       patch.ledger.boundary_work += work;
       piece.projected = false;

@@ -5,15 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cairn/body/deformation.hpp"
+
 namespace cairn {
 namespace {
-
-template <int Dim>
-double determinant_of(const Points<Dim>& points, int p) {
-  Tensor<Dim, double> F;
-  for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(PointColumns<Dim>::deformation + i)[p];
-  return determinant(F);
-}
 
 /// `size` numbers of a point, from column `first` on.
 template <int Dim>
@@ -31,7 +26,7 @@ bool all_finite(const std::vector<double>& values) {
 template <int Dim>
 Fault complaint_of(const Points<Dim>& points, int p) {
   using C = PointColumns<Dim>;
-  const double J = determinant_of(points, p);
+  const double J = volume_ratio(points, p);
   if (std::isfinite(J) && J <= 0) return {Fault::inverted, fmt::format("is inverted: det F = {:.6g}", J)};
   const auto report = [](Fault::Kind kind, const char* name, const std::vector<double>& values, const char* unit) {
     return Fault{kind, fmt::format("is not finite: {} ({:.6g}){}", name, fmt::join(values, ", "), unit)};

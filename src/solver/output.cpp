@@ -2,6 +2,7 @@
 
 #include <numeric>
 
+#include "cairn/body/deformation.hpp"
 #include "cairn/solver/body_states.hpp"
 #include "columns.hpp"
 
@@ -116,9 +117,7 @@ class PointTable {
                   [value](const Piece<Dim>& piece, int p, int c) { return value(piece.points, p, c); });
   }
   static double volume(const Points<Dim>& points, int p) {
-    Tensor<Dim, double> F;
-    for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
-    return points.column(C::volume)[p] * determinant(F);
+    return points.column(C::volume)[p] * volume_ratio(points, p);
   }
   /// A variable of the laws; zero for points whose law has none of that name.
   void add_state(const std::string& name) {

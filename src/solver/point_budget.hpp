@@ -1,6 +1,7 @@
 #pragma once
 /// What one point adds to the sums over everything.
 
+#include "cairn/body/deformation.hpp"
 #include "cairn/solver/simulation.hpp"
 
 namespace cairn {
@@ -44,9 +45,7 @@ void for_budgets(const Piece<Dim>& piece, const SolverMaterial& material, bool r
           for (int s = 0; s < spin_size<Dim>; ++s) spin += inertia[p][s] * std::pow(points.column(C::spin + s)[p], 2);
           b.kinetic = 0.5 * b.mass * (squared + spin);
           b.spin = 0.5 * b.mass * spin;
-          Tensor<Dim, double> F;
-          for (int k = 0; k < tensor_size<Dim>; ++k) F.c[k] = points.column(C::deformation + k)[p];
-          b.strain = volume * law.strain_energy(F, state.data());
+          b.strain = volume * law.strain_energy(deformation_of(points, p), state.data());
           b.potential = -b.mass * height;
           b.plastic = volume * law.plastic_work(state.data());
           if constexpr (requires { law.viscous_dissipation(state.data()); })

@@ -1,5 +1,6 @@
 // What a stage changes, and what is measured to tell when it ends.
 
+#include "cairn/body/deformation.hpp"
 #include "cairn/parallel/patch_sums.hpp"
 #include "cairn/solver/body_states.hpp"
 #include "cairn/solver/simulation.hpp"
@@ -78,11 +79,8 @@ double Simulation<Dim>::packing_fraction() const {
     if (patch.point_count() == 0) continue;
     double volume = 0;
     for (const auto& piece : patch.pieces)
-      for (int p = 0; p < piece.points.size(); ++p) {
-        Tensor<Dim, double> F;
-        for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = piece.points.column(C::deformation + i)[p];
-        volume += piece.points.column(C::volume)[p] * determinant(F);
-      }
+      for (int p = 0; p < piece.points.size(); ++p)
+        volume += piece.points.column(C::volume)[p] * volume_ratio(piece.points, p);
     sums.add(patch.id, {volume});
   }
   return sums.on_all(comm_)[0] / room();

@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "cairn/body/deformation.hpp"
 #include "cairn/crack/rim.hpp"
 #include "cairn/solver/simulation.hpp"
 
@@ -170,8 +171,7 @@ void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<C
               at.position = beside(lattice_, at.position, tips[t].position);
               if ((at.position - tips[t].position).squaredNorm() >= reach * reach) continue;
               if (kinematics.empty()) kinematics = point_kinematics(piece, lattice_, transfer_);
-              Tensor<Dim, double> F;
-              for (int i = 0; i < tensor_size<Dim>; ++i) F.c[i] = points.column(C::deformation + i)[p];
+              const Tensor<Dim, double> F = deformation_of(points, p);
               for (int i = 0; i < Dim; ++i) {
                 at.velocity[i] = points.column(C::velocity + i)[p], at.acceleration[i] = kinematics[p][i];
                 for (int j = 0; j < Dim; ++j) {

@@ -189,18 +189,27 @@ def differences(a: Path, b: Path) -> list[str]:
     return lines
 
 
+def run_on_ranks(cairn: Program, case: Path, out: Path, settings: dict, ranks: tuple) -> list[str]:
+    """Runs a case into OUT_N on each number N of ranks, the first of them 1; what went wrong or differs."""
+    failures = []
+    for n in ranks:
+        folder = out.with_name(f"{out.name}_{n}")
+        done = cairn("run", case, "--out", folder, *sets(settings), ranks=n, timeout=300)
+        if done.code != 0:
+            return [f"{out.name} on {n} ranks: exit code {done.code}: {done.err}"]
+        if n > 1:
+            different = differences(out.with_name(f"{out.name}_1"), folder)
+            failures += [f"{out.name} on {n} ranks: {line}" for line in different[:5]]
+    return failures
+
+
 def check_growth(cairn: Program, case: Path, scratch: Path) -> list[str]:
     """Laws, growth and split on several ranks, and from a checkpoint in the middle of them on another number."""
     settings = SETTINGS | {"time.steps": 160, "output.checkpoint": "{ every = 40, keep = 5 }",
                            "output.tips": "{ every = 10 }"}
-    failures = []
-    for ranks in (1, 2, 5):
-        done = cairn("run", case, "--out", scratch / f"growing_{ranks}", *sets(settings), ranks=ranks, timeout=300)
-        if done.code != 0:
-            return [f"growth on {ranks} ranks: exit code {done.code}: {done.err}"]
-        if ranks > 1:
-            different = differences(scratch / "growing_1", scratch / f"growing_{ranks}")
-            failures += [f"growth on {ranks} ranks: {line}" for line in different[:5]]
+    failures = run_on_ranks(cairn, case, scratch / "growing", settings, (1, 2, 5))
+    if failures:
+        return failures
     one = scratch / "growing_1"
     with h5py.File(one / "particles_000008.vtkhdf") as file:
         bodies = np.unique(file["VTKHDF/PointData/body"][:] if "VTKHDF" in file else file["body"][:])
@@ -231,14 +240,9 @@ def check_pictures(folder: Path) -> list[str]:
 
 
 def check_same_bits(cairn: Program, case: Path, scratch: Path) -> list[str]:
-    failures = []
-    for ranks in (1, 3, 5):
-        done = cairn("run", case, "--out", scratch / f"ranks_{ranks}", *sets(SETTINGS), ranks=ranks, timeout=300)
-        if done.code != 0:
-            return [f"on {ranks} ranks: exit code {done.code}: {done.err}"]
-        if ranks > 1:
-            different = differences(scratch / "ranks_1", scratch / f"ranks_{ranks}")
-            failures += [f"on {ranks} ranks: {line}" for line in different[:5]]
+    failures = run_on_ranks(cairn, case, scratch / "ranks", SETTINGS, (1, 3, 5))
+    if failures:
+        return failures
     first, last = (crack_rows(scratch / "ranks_1", f"cracks_{n:06}.h5") for n in (0, 3))
     if len(last) < len(first):  # segments longer than a cell divide
         failures.append("crack points went")
@@ -274,14 +278,9 @@ def check_balls(cairn: Program, scratch: Path) -> list[str]:
     case = scratch / "balls.toml"
     case.write_text(BALLS)
     (scratch / "surface.stl").write_text(SURFACE)
-    failures = []
-    for ranks in (1, 2, 3):
-        done = cairn("run", case, "--out", scratch / f"balls_{ranks}", ranks=ranks, timeout=300)
-        if done.code != 0:
-            return [f"balls on {ranks} ranks: exit code {done.code}: {done.err}"]
-        if ranks > 1:
-            different = differences(scratch / "balls_1", scratch / f"balls_{ranks}")
-            failures += [f"balls on {ranks} ranks: {line}" for line in different[:5]]
+    failures = run_on_ranks(cairn, case, scratch / "balls", {}, (1, 2, 3))
+    if failures:
+        return failures
     out = scratch / "balls_restarted"
     done = cairn("run", case, "--out", out, "--restart", scratch / "balls_1" / "checkpoint_000000.h5", ranks=2,
                  timeout=300)

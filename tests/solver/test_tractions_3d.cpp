@@ -57,9 +57,7 @@ TEST(SlowTractions3D, HalvesPulledApartTakeTheEnergyOfTheLaw) {
       const double M = shear ? 4e3 : soft_bulk + 4.0 / 3 * 4e3, L = 8, speed = 4e-4;
       Case c = column(static_cast<int>(L), shear ? 0 : speed, shear ? speed : 0, CrackLaw::cohesive);
       CohesiveSpec& law = c.cracks[0].cohesive;
-      law.shape = shape, law.strength = {0.01 * M, 0.01 * M};
-      law.energy = {0.01 * M * 0.1, 0.01 * M * 0.1};  // critical opening .2 cells
-      law.peak = 0.3;
+      set_pulled_law(law, shape, M);
       c.solver.noise_filter = NoiseFilter::off;
       Simulation<3> simulation(c, MPI_COMM_SELF);
       double before = 0, worst = 0;

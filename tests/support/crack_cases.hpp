@@ -1,6 +1,8 @@
 #pragma once
 /// Cases with cracks, for tests.
 
+#include <gtest/gtest.h>
+
 #include "cairn/core/error.hpp"
 #include "cases.hpp"
 
@@ -107,6 +109,48 @@ void set_velocities(Simulation<Dim>& simulation, F&& velocity) {
         const Vec<Dim> v = velocity(x);
         for (int d = 0; d < Dim; ++d) piece.points.column(C::velocity + d)[p] = v[d];
       }
+}
+
+/// Cohesive law of halves that are pulled apart, of strength M/100 and the critical opening .2 (of a triangle).
+inline void set_pulled_law(CohesiveSpec& law, CohesiveShape shape, double M) {
+  law.shape = shape, law.strength = {0.01 * M, 0.01 * M}, law.energy = {0.001 * M, 0.001 * M}, law.peak = 0.3;
+}
+
+/// A block that stands on a base, both of one body, under a gravity of 10 that is turned by 30 degrees; a crack with
+/// mu = .3 between them, at the height `plane`. It slides with x = g (sin - mu cos) t^2/2, and friction takes
+/// mu m g cos x. \param under  whether a place lies under the block as it stood at the start
+template <int Dim, class Under>
+void check_sliding(Case c, double plane, Under&& under) {
+  c.domain.gravity = Vec3(10 * Vec3(0.5, -std::sqrt(0.75), 0));
+  // Stiff: what the block slips while gravity comes on is lost for the comparison.
+  c.materials[0].parameters = {{"shear_modulus", 1.2e7}, {"bulk_modulus", 2.4e7}};
+  c.faces[2].type = FaceType::fixed;
+  Simulation<Dim> simulation(c, MPI_COMM_SELF);
+  const auto start = points_of(simulation);
+  const Totals before = simulation.totals();
+  while (simulation.time() < 0.6) simulation.step(0.6 - simulation.time());
+  double mass = 0, x = 0, v = 0;
+  for (const auto& [id, a] : points_of(simulation)) {
+    if (start.at(id).x.y() < plane) continue;
+    mass += a.mass, x += a.mass * (a.x.x() - start.at(id).x.x()), v += a.mass * a.v.x();
+  }
+  x /= mass, v /= mass;
+  const double a = 10 * (0.5 - 0.3 * std::sqrt(0.75)), friction = 0.3 * mass * 10 * std::sqrt(0.75) * 0.5 * a * 0.36;
+  const Totals after = simulation.totals();
+  const double taken = after.contact_dissipation - before.contact_dissipation;
+  std::printf("x %.4f, v %.4f, friction %.4f of the exact ones\n", x / (0.5 * a * 0.36), v / (a * 0.6),
+              taken / friction);
+  EXPECT_NEAR(x / (0.5 * a * 0.36), 1, 0.03);
+  EXPECT_NEAR(v / (a * 0.6), 1, 0.02);
+  EXPECT_NEAR(taken / friction, 1, 0.04);
+  EXPECT_NEAR(after.energy(), before.energy(), 0.01 * friction);
+  for (const auto& patch : simulation.patches())
+    for (const auto& point : patch.cracks) {
+      Vec<Dim> then = point.plane;
+      then.x() -= x;
+      if (point.own && under(then))
+        EXPECT_GT(point.opening().y(), -0.01 * 0.1) << "faces went through each other at " << point.plane.transpose();
+    }
 }
 
 }  // namespace cairn::test
