@@ -200,12 +200,13 @@ double CrackSegments<Dim>::Segment::distance_to(const Vec<Dim>& x) const {
   return nearest;
 }
 
+namespace {
+
+/// Appends what the lines from a piece's points to nodes cross, by ascending point. Returns the nodes that had more
+/// than two cracks to a point.
 template <int Dim>
-int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std::vector<Crack>& cracks,
-               const Lattice<Dim>& lattice) {
-  FurtherRows<Dim>& further = piece.nodes.further;
-  further.clear();
-  std::vector<Crossed<Dim>> all;
+int find_crossings(const Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std::vector<Crack>& cracks,
+                   const Lattice<Dim>& lattice, std::vector<Crossed<Dim>>& all) {
   int crowded = 0;
   for (int p = 0; p < piece.points.size(); ++p) {
     Vec<Dim> x;
@@ -240,7 +241,14 @@ int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std:
       all.push_back({p, {place, crossed.sides, true}, crossed.sums});
     });
   }
-  if (all.empty()) return 0;
+  return crowded;
+}
+
+/// The further rows of a piece from what its lines cross, and each point's way to its rows.
+template <int Dim>
+void lay_rows(Piece<Dim>& piece, const Lattice<Dim>& lattice, const std::vector<Crossed<Dim>>& all) {
+  if (all.empty()) return;
+  FurtherRows<Dim>& further = piece.nodes.further;
   for (const auto& c : all) further.rows.push_back(c.row);
   std::sort(further.rows.begin(), further.rows.end());
   further.rows.erase(std::unique(further.rows.begin(), further.rows.end()), further.rows.end());
@@ -262,6 +270,17 @@ int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std:
     for (int d = Dim - 1; d >= 0; --d) at = at * PointSides<Dim>::extent + inside[d];
     point.row[at] = row;
   }
+}
+
+}  // namespace
+
+template <int Dim>
+int find_sides(Piece<Dim>& piece, const CrackSegments<Dim>& segments, const std::vector<Crack>& cracks,
+               const Lattice<Dim>& lattice) {
+  piece.nodes.further.clear();
+  std::vector<Crossed<Dim>> all;
+  const int crowded = find_crossings(piece, segments, cracks, lattice, all);
+  lay_rows(piece, lattice, all);
   return crowded;
 }
 

@@ -61,8 +61,7 @@ bool Simulation<Dim>::has_room(const Shape& shape) const {
       for (int p = 0; p < piece.points.size() && free; ++p) {
         double outside = 0, squared = 0;
         for (int d = 0; d < Dim; ++d) {
-          double way = piece.points.column(d)[p] - middle[d];
-          if (lattice_.periodic(d)) way -= lattice_.length(d) * std::round(way / lattice_.length(d));
+          const double x = piece.points.column(d)[p], way = x - middle[d] - lattice_.periods_between(d, x, middle[d]);
           outside = std::max({outside, middle[d] + way - box.upper[d], box.lower[d] - middle[d] - way});
           squared += way * way;
         }

@@ -1,5 +1,6 @@
 // Tips of cracks: J-integrals and stress intensities.
 
+#include <bit>
 #include <map>
 
 #include "cairn/body/deformation.hpp"
@@ -24,24 +25,38 @@ void set_moduli(CrackTip<Dim>& tip, const Material& material) {
   tip.shear_modulus = mu;
 }
 
-/// Continuous distance from the tip, the shortest across periodic boundaries.
+/// The image of a place that is nearest to the tip.
 template <int Dim>
 Vec<Dim> beside(const Lattice<Dim>& lattice, Vec<Dim> x, const Vec<Dim>& tip) {
-  for (int d = 0; d < Dim; ++d)
-    if (lattice.periodic(d)) x[d] -= lattice.length(d) * std::round((x[d] - tip[d]) / lattice.length(d));
+  for (int d = 0; d < Dim; ++d) x[d] -= lattice.periods_between(d, x[d], tip[d]);
   return x;
+}
+
+/// Whether points of the patch with these cells can be nearer than `reach` [m] to the tip.
+template <int Dim>
+bool may_reach(const Lattice<Dim>& lattice, const Box<Dim>& cells, const Vec<Dim>& tip, double reach) {
+  double squared = 0;
+  for (int d = 0; d < Dim; ++d) {
+    // Points may be half a cell outside the domain.
+    const double lower = lattice.node_position(d, cells.lower[d] - 1);
+    const double upper = lattice.node_position(d, cells.upper[d] + 1);
+    const double x = tip[d] - lattice.periods_between(d, tip[d], 0.5 * (lower + upper));
+    squared += std::pow(std::max({lower - x, x - upper, 0.0}), 2);
+  }
+  return squared < reach * reach;
 }
 
 /// Means of the sums along rims, weighted by hat functions of the distance, and of what they are divided by: each point
 /// keeps its own axes. On a grid a curved rim is a staircase, whose steps have intensities of their own.
-void average_along_rims(std::vector<CrackTip<3>>& tips, std::vector<TipSums>& sums, double reach) {
+void average_along_rims(const Lattice<3>& lattice, double reach, std::vector<CrackTip<3>>& tips,
+                        std::vector<TipSums>& sums) {
   const std::vector<TipSums> single = sums;
   const std::vector<CrackTip<3>> before = tips;
   for (std::size_t t = 0; t < tips.size(); ++t) {
     sums[t] = {}, tips[t].weight = 0;
     for (std::size_t u = 0; u < tips.size(); ++u) {
       if (tips[u].crack != tips[t].crack) continue;
-      const double share = 1 - (tips[u].position - tips[t].position).norm() / reach;
+      const double share = 1 - (beside(lattice, tips[u].position, tips[t].position) - tips[t].position).norm() / reach;
       if (!(share > 0)) continue;
       const TipSums& s = single[u];
       tips[t].weight += share * before[u].weight;
@@ -155,15 +170,18 @@ void Simulation<Dim>::add_tip_terms(const Patch<Dim>& patch, const std::vector<C
   using C = PointColumns<Dim>;
   const double h = lattice_.smallest_spacing(), inner = j_radius_[0] * h, outer = j_radius_[1] * h;
   const double reach = Dim == 3 ? std::hypot(outer, hat * h) : outer;
+  std::vector<std::size_t> reached;
+  for (std::size_t t = 0; t < tips.size(); ++t)
+    if (may_reach(lattice_, patch.cells, tips[t].position, reach)) reached.push_back(t);
   for (const auto& piece : patch.pieces) {
-    if (is_rigid(piece) || piece.points.size() == 0) continue;
+    if (reached.empty() || is_rigid(piece) || piece.points.size() == 0) continue;
     const Points<Dim>& points = piece.points;
     const SolverMaterial& material = material_of(piece);
     std::vector<std::array<double, Dim + Dim * Dim>> kinematics;  // where a tip is near
     std::visit(
         [&](const auto& law) {
           std::array<double, state_capacity> state{};
-          for (std::size_t t = 0; t < tips.size(); ++t)
+          for (const std::size_t t : reached)
             for (int p = 0; p < points.size(); ++p) {
               if (!cracks_[tips[t].crack].cuts(piece.body)) break;
               TipPoint<Dim> at;
@@ -206,25 +224,25 @@ std::vector<TipState<Dim>> Simulation<Dim>::tip_states() {
       }
   }
   const double dt = find_motion();
-  std::vector<double> mine;
+  std::vector<double> mine;  // tip, patch, sums
   for (std::size_t p = 0; p < patches_.size(); ++p) {
     std::vector<TipSums> sums(tips.size());
     add_tip_terms(patches_[p], tips, sums);
     if (!patches_[p].pieces.empty()) add_face_terms(p, tips, dt, sums);
-    mine.push_back(static_cast<double>(patches_[p].id));
-    for (const TipSums& s : sums) mine.insert(mine.end(), {s.J, s.J_static, s.I_opening, s.I_sliding, s.I_tearing});
+    for (std::size_t t = 0; t < tips.size(); ++t)
+      if (sums[t] != TipSums{}) {
+        mine.insert(mine.end(), {static_cast<double>(t), std::bit_cast<double>(patches_[p].id)});
+        mine.insert(mine.end(), {sums[t].J, sums[t].J_static, sums[t].I_opening, sums[t].I_sliding, sums[t].I_tearing});
+      }
   }
   const std::vector<double> all = gather_on_all(mine, comm_);
-  const std::size_t row = 1 + TipSums::size * tips.size();
-  std::map<double, const double*> by_patch;
-  for (std::size_t i = 0; i < all.size(); i += row) by_patch[all[i]] = &all[i + 1];
+  std::map<std::pair<std::size_t, PatchId>, TipSums> ordered;
+  for (std::size_t i = 0; i < all.size(); i += 2 + TipSums::size)
+    ordered[{static_cast<std::size_t>(all[i]), std::bit_cast<PatchId>(all[i + 1])}] = {
+        all[i + 2], all[i + 3], all[i + 4], all[i + 5], all[i + 6]};
   std::vector<TipSums> sums(tips.size());
-  for (std::size_t t = 0; t < tips.size(); ++t)
-    for (const auto& [patch, values] : by_patch) {
-      const double* v = values + TipSums::size * t;
-      sums[t].add({v[0], v[1], v[2], v[3], v[4]});
-    }
-  if constexpr (Dim == 3) average_along_rims(tips, sums, rim_reach * lattice_.smallest_spacing());
+  for (const auto& [of, part] : ordered) sums[of.first].add(part);
+  if constexpr (Dim == 3) average_along_rims(lattice_, rim_reach * lattice_.smallest_spacing(), tips, sums);
   std::vector<TipState<Dim>> states;
   for (std::size_t t = 0; t < tips.size(); ++t) {
     const TipSums& sum = sums[t];

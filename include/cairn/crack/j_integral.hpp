@@ -41,6 +41,7 @@ struct TipSums {
   double J = 0, J_static = 0, I_opening = 0, I_sliding = 0;
   double I_tearing = 0;  // 3D
   static constexpr int size = 5;
+  bool operator==(const TipSums&) const = default;
   void add(const TipSums& more) {
     J += more.J, J_static += more.J_static;
     I_opening += more.I_opening, I_sliding += more.I_sliding, I_tearing += more.I_tearing;
