@@ -30,7 +30,10 @@ bool wait_or_leave(std::span<MPI_Request> requests) {
   return done != 0;
 }
 
-std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm) {
+namespace {
+
+template <class T>
+std::vector<T> gather_first(std::span<const T> mine, MPI_Datatype type, MPI_Comm comm) {
   int rank = 0, ranks = 1;
   MPI_Comm_rank(comm, &rank);
   MPI_Comm_size(comm, &ranks);
@@ -38,12 +41,10 @@ std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm)
   const int count = static_cast<int>(mine.size());
   MPI_Gather(&count, 1, MPI_INT, counts.data(), 1, MPI_INT, 0, comm);
   std::partial_sum(counts.begin(), counts.end() - 1, starts.begin() + 1);
-  std::vector<double> all(rank == 0 ? starts.back() + counts.back() : 0);
-  MPI_Gatherv(mine.data(), count, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, 0, comm);
+  std::vector<T> all(rank == 0 ? starts.back() + counts.back() : 0);
+  MPI_Gatherv(mine.data(), count, type, all.data(), counts.data(), starts.data(), type, 0, comm);
   return all;
 }
-
-namespace {
 
 template <class T>
 std::vector<T> gather_all(std::span<const T> mine, MPI_Datatype type, MPI_Comm comm) {
@@ -59,6 +60,13 @@ std::vector<T> gather_all(std::span<const T> mine, MPI_Datatype type, MPI_Comm c
 }
 
 }  // namespace
+
+std::vector<std::int64_t> gather_on_first(std::span<const std::int64_t> mine, MPI_Comm comm) {
+  return gather_first(mine, MPI_INT64_T, comm);
+}
+std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm) {
+  return gather_first(mine, MPI_DOUBLE, comm);
+}
 
 std::vector<std::int64_t> gather_on_all(std::span<const std::int64_t> mine, MPI_Comm comm) {
   return gather_all(mine, MPI_INT64_T, comm);

@@ -17,6 +17,7 @@
 #include "cairn/solver/output.hpp"
 #include "history_tables.hpp"
 #include "output_clocks.hpp"
+#include "parts_watch.hpp"
 #include "restart.hpp"
 #include "run_report.hpp"
 #include "stage_keeper.hpp"
@@ -65,6 +66,7 @@ class Run {
     if (from) restore(from->state());
     simulation_.ask([this] { return notice(); });
     stages_.note_start(simulation_);
+    parts_.begin(simulation_);
     open_files(from);
     for (const auto& warning : simulation_.warnings()) fmt::print(stderr, "warning: {}\n", printable(warning));
   }
@@ -114,7 +116,7 @@ class Run {
     flush_results();
     display.finish();
     const Totals totals = simulation_.totals();
-    if (rank_ == 0) tell_departures(totals);
+    if (rank_ == 0) tell_departures(totals), parts_.tell_again();
     if (rank_ == 0 && !ended_.empty())
       say(stdout, "ended at step {}, time {} s: {}\n", simulation_.steps(), simulation_.time(), ended_);
     report_run(simulation_, settings_.profile, summary(step_wall), comm_);
@@ -239,7 +241,8 @@ class Run {
     if (wanted(clocks_.history)) write_history();
     if (wanted(clocks_.forces)) tables_.add_forces(simulation_);
     if (wanted(clocks_.tips)) tables_.add_tips(simulation_);
-    if (wanted(clocks_.particles)) {
+    const bool particles = wanted(clocks_.particles);
+    if (particles) {
       const std::string file = name("particles", clocks_.particles);
       write_particles(simulation_, next_result(file), case_.output.particles.fields);
       particle_index_.add(file, time, comm_);
@@ -251,7 +254,9 @@ class Run {
       write_contacts(simulation_, next_result(name("contacts", clocks_.contacts)), time - contacts_cleared_);
     if (contacts || (grains && !clocks_.contacts.active())) simulation_.clear_contacts(), contacts_cleared_ = time;
     if (step == 0) clocks_.checkpoint.skip(step, time, wall);  // nothing is lost by starting again
-    if (wanted(clocks_.checkpoint)) write_checkpoint_file(true);
+    const bool checkpoint = wanted(clocks_.checkpoint);
+    if (checkpoint) write_checkpoint_file(true);
+    if (all || particles || grains || checkpoint) parts_.look(simulation_);
   }
 
   void write_crack_files(const std::string& cracks, const std::string& tips) {
@@ -374,6 +379,7 @@ class Run {
   SeriesIndex particle_index_;
   HistoryTables<Dim> tables_;
   EnergyBook book_;
+  PartsWatch parts_;
   bool needs_wall_ = false;      // an output depends on wall time
   double contacts_cleared_ = 0;  // [s]
   fs::path last_checkpoint_;

@@ -1,109 +1,18 @@
 // Parts that cracks cut off become bodies of their own: contact between bodies takes over, which knows them wherever
 // they go, and the cracks between them are forgotten.
-//
-// A body hangs together by its rows of nodes: all rows that one material point touches belong to one part. Rows on the
-// two sides of a crack are one where its faces are bound: by their law, or by crack points that hold each other.
+// Rows on the two sides of a crack are one where its faces are bound: by their law, or by crack points that hold each
+// other.
 
-#include <map>
-#include <numeric>
 #include <set>
 #include <utility>
 
+#include "body_parts.hpp"
 #include "cairn/core/error.hpp"
-#include "cairn/solver/simulation.hpp"
 
 namespace cairn {
 namespace {
 
-constexpr double point_reach = 1.5;  // cells from a point to the nodes that it may touch
-constexpr double bond_reach = 1.5;   // cells around a crack point in which it binds the sides
-
-/// Sets that are united step by step; each is known by its smallest member.
-class Sets {
- public:
-  int add() {
-    up_.push_back(static_cast<int>(up_.size()));
-    return up_.back();
-  }
-  int find(int i) {
-    while (up_[i] != i) i = up_[i] = up_[up_[i]];
-    return i;
-  }
-  void unite(int a, int b) {
-    a = find(a), b = find(b);
-    up_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> up_;
-};
-
-/// A row as all patches name it.
-struct RowName {
-  std::int64_t body, place, sides;
-  friend auto operator<=>(const RowName&, const RowName&) = default;
-};
-
-/// The rows that the points of a piece touch, and the parts that hang together within it.
-template <int Dim>
-class PieceParts {
- public:
-  PieceParts(const Piece<Dim>& piece, const Lattice<Dim>& lattice, const std::vector<SideSet>& united) {
-    const FurtherRows<Dim>& further = piece.nodes.further;
-    std::vector<int> of_point;
-    std::size_t block = 0;
-    for (int p = 0; p < piece.points.size(); ++p) {
-      while (block < further.blocks.size() && further.blocks[block] + lane_count <= p) ++block;
-      const bool cut = block < further.blocks.size() && further.blocks[block] <= p;
-      Box<Dim> around;
-      for (int d = 0; d < Dim; ++d) {
-        const double xi = lattice.scaled(d, piece.points.column(d)[p]);
-        around.lower[d] = static_cast<int>(std::ceil(xi - point_reach - 1e-9));
-        around.upper[d] = static_cast<int>(std::floor(xi + point_reach + 1e-9)) + 1;
-      }
-      int first = -1;
-      for_each(intersection(around, piece.nodes.box), [&](const Index<Dim>& place) {
-        const int row = cut ? further.points[block * lane_count + p % lane_count].at(place) : -1;
-        const SideSet sides = row < 0 ? SideSet() : united[row];
-        const auto [at, is_new] = rows_.try_emplace({place, sides.key()}, 0);
-        if (is_new) at->second = sets_.add();
-        first < 0 ? void(first = at->second) : sets_.unite(first, at->second);
-      });
-      of_point.push_back(first);
-    }
-    for (int p = 0; p < piece.points.size(); ++p) {
-      const auto [at, is_new] = least_.try_emplace(sets_.find(of_point[p]), piece.points.ids()[p]);
-      if (!is_new) at->second = std::min(at->second, piece.points.ids()[p]);
-    }
-    for (const int row : of_point) label_of_point_.push_back(least_.at(sets_.find(row)));
-  }
-
-  /// For each point the smallest id of its part.
-  const std::vector<std::int64_t>& labels() const { return label_of_point_; }
-  /// Calls f(place, sides, label) for every row.
-  template <class F>
-  void for_rows(F&& f) {
-    for (const auto& [name, set] : rows_) f(name.first, SideSet(name.second), least_.at(sets_.find(set)));
-  }
-
- private:
-  std::map<std::pair<Index<Dim>, std::int64_t>, int> rows_;
-  Sets sets_;
-  std::map<int, std::int64_t> least_;
-  std::vector<std::int64_t> label_of_point_;
-};
-
-/// One number for a node, whatever the patch.
-template <int Dim>
-std::int64_t name_of_node(const Lattice<Dim>& lattice, const Index<Dim>& place) {
-  std::int64_t name = 0;
-  for (int d = Dim - 1; d >= 0; --d) {
-    const int n = lattice.cells()[d];
-    const int i = lattice.periodic(d) ? ((place[d] % n) + n) % n : place[d] + 8;
-    name = name << 21 | i;
-  }
-  return name;
-}
+constexpr double bond_reach = 1.5;  // cells around a crack point in which it binds the sides
 
 /// The sets of sides of a piece's further rows, without the cracks whose faces are bound there.
 template <int Dim>
@@ -131,29 +40,6 @@ void renumber_walls(Patch<Dim>& patch, int body) {
     patch.contacts.emplace(std::pair(pair.first, pair.second + (pair.second >= body)), sum);
 }
 
-/// What a run's labels come to when those that share a row in different patches are one.
-std::map<std::int64_t, std::int64_t> join(const std::vector<std::int64_t>& rows,
-                                          std::map<std::int64_t, std::int64_t>& body_of) {
-  std::map<std::int64_t, int> number;
-  std::vector<std::int64_t> labels;
-  for (std::size_t i = 0; i < rows.size(); i += 4) labels.push_back(rows[i + 3]);
-  std::ranges::sort(labels);
-  const auto rest = std::ranges::unique(labels);
-  labels.erase(rest.begin(), rest.end());
-  Sets sets;  // ascending, so that the smallest label names the set
-  for (const std::int64_t label : labels) number[label] = sets.add();
-  std::map<RowName, int> at_row;
-  for (std::size_t i = 0; i < rows.size(); i += 4) {
-    const int n = number[rows[i + 3]];
-    const auto [at, is_new] = at_row.try_emplace({rows[i], rows[i + 1], rows[i + 2]}, n);
-    if (!is_new) sets.unite(at->second, n);
-    body_of[rows[i + 3]] = rows[i];
-  }
-  std::map<std::int64_t, std::int64_t> joined;
-  for (const std::int64_t label : labels) joined[label] = labels[sets.find(number[label])];
-  return joined;
-}
-
 }  // namespace
 
 template <int Dim>
@@ -179,28 +65,19 @@ void Simulation<Dim>::split_bodies() {
       if (!cut.contains(piece.body) || piece.points.size() == 0) continue;
       if (patches_[p].cracks.empty()) lay_out(patches_[p], piece);
       piece.projected = false;
-      auto& here = parts[p]
-                       .emplace(piece.body, PieceParts<Dim>(piece, lattice_,
-                                                            united_sides<Dim>(patches_[p], piece, lattice_, contact_)))
-                       .first->second;
-      std::set<std::int64_t> told;
-      here.for_rows([&](const Index<Dim>& place, SideSet sides, std::int64_t label) {
-        const bool shared =
-            std::ranges::any_of(patches_[p].overlaps, [&](const auto& box) { return box.contains(place); });
-        if (shared || told.insert(label).second)
-          rows.insert(rows.end(), {piece.body, name_of_node<Dim>(lattice_, place), sides.key(), label});
-      });
+      const auto united = united_sides<Dim>(patches_[p], piece, lattice_, contact_);
+      const auto at = parts[p].emplace(piece.body, PieceParts<Dim>(piece, lattice_, united)).first;
+      at->second.tell_shared_rows(patches_[p], lattice_, rows);
     }
-  std::map<std::int64_t, std::int64_t> body_of;
-  const auto joined = join(gather_on_all(rows, comm_), body_of);
+  const JoinedParts joined = join_parts(gather_on_all(rows, comm_));
 
   // The part with the smallest id keeps the body's number; the others get new ones in the order of theirs.
   std::map<std::int64_t, int> number;  // of parts, by their label
   std::set<int> split;
   for (const std::int64_t body : cut) {
     bool first = true;
-    for (const auto& [label, whole] : joined) {
-      if (body_of[label] != body || label != whole) continue;
+    for (const auto& [label, part] : joined) {
+      if (part.body != body || part.label != label) continue;
       number[label] = first ? static_cast<int>(body) : add_part(static_cast<int>(body));
       if (!first) split.insert({static_cast<int>(body), number[label]});
       first = false;
@@ -211,7 +88,7 @@ void Simulation<Dim>::split_bodies() {
     for (const auto& [body, here] : parts[p]) {
       std::map<int, std::vector<int>> points;
       for (std::size_t i = 0; i < here.labels().size(); ++i)
-        points[number.at(joined.at(here.labels()[i]))].push_back(static_cast<int>(i));
+        points[number.at(joined.at(here.labels()[i]).label)].push_back(static_cast<int>(i));
       const Points<Dim> before = patches_[p].piece_of(body, 0).points;
       const int states = before.columns() - PointColumns<Dim>::state;
       for (const auto& [to, chosen] : points) {

@@ -60,6 +60,7 @@ class RollCall {
 };
 
 /// The numbers of all ranks one after the other, in the order of the ranks, on rank 0; none elsewhere. Collective.
+std::vector<std::int64_t> gather_on_first(std::span<const std::int64_t> mine, MPI_Comm comm);
 std::vector<double> gather_on_first(std::span<const double> mine, MPI_Comm comm);
 
 /// The whole numbers of all ranks one after the other, in the order of the ranks. Collective.
