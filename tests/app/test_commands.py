@@ -209,6 +209,8 @@ def test_scripts(cairn: Program, here: Path):
     for name, code in (("plot", 2), ("measure", 2), ("compare-runs", 1), ("convert-grains", 2),
                        ("convert-labels", 2), ("convert-cells", 2)):
         expect_code(cairn(name, "--help", cwd=here), 0, "usage")
+        told = cairn(name, "--help", cwd=here).out
+        expect("exec" not in told and re.search(r"^[A-Z][^.]+\.", told, re.MULTILINE), f"{name} --help says:\n{told}")
         arguments = ["nothing"] * (2 if name == "compare-runs" else 1)
         expect_code(cairn(name, *arguments, cwd=here), code, "nothing")
 
