@@ -15,7 +15,7 @@ _cairn() {
     --restart) mapfile -t COMPREPLY < <(compgen -W latest -- "$word") ;;
   esac
   case $command in
-    run) words="--out --set --restart --allow-changes --overwrite --profile --help" ;;
+    run) words="--out --set --restart --allow-changes --overwrite --profile --explain --help" ;;
     check) words="--set --help" ;;
     pack) words="-o --help" ;;
     measure) words="--at --every -o --table --only --box --threshold --rattlers --radius --cell --across --bins --by-points --help" ;;

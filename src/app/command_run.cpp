@@ -90,6 +90,7 @@ int command_run(const RunArguments& arguments) {
   Case c;
   if (const int code = settle(attempt([&] { c = read_case(arguments.file, arguments.overrides); }))) return code;
   print_warnings(c.warnings);
+  if (arguments.explain) return settle(attempt([&] { explain_step(c, MPI_COMM_WORLD); }));
 
   RunSettings settings;
   settings.out = arguments.out.empty() ? arguments.file.stem() : arguments.out;

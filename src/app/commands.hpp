@@ -17,7 +17,7 @@ struct RunArguments {
   std::vector<Override> overrides;
   std::string program;  // as it was called
   std::string restart;
-  bool profile = false, overwrite = false, allow_changes = false;
+  bool profile = false, overwrite = false, allow_changes = false, explain = false;
 };
 
 struct PackArguments {

@@ -61,6 +61,7 @@ void define(CLI::App& app, Arguments& a, std::function<int()>& command) {
   run->add_flag("--allow-changes", a.run.allow_changes, "with --restart: go on although the case has changed");
   run->add_flag("--overwrite", a.run.overwrite, "remove the results that the folder already holds");
   run->add_flag("--profile", a.run.profile, "report where the time went");
+  run->add_flag("--explain", a.run.explain, "print what a step of this case consists of, and write nothing");
   run->callback([&] {
     for (const auto& text : a.sets) a.run.overrides.push_back(parse_override(text));
     a.run.file = a.file;

@@ -11,11 +11,11 @@ namespace cairn {
 /// Notes which point a stage found to be inverted or not finite. What it did to others in later stages does not matter:
 /// the most urgent fault of all ranks is the one reported, that of the earliest stage.
 template <int Dim>
-void Simulation<Dim>::look_for_fault(int urgency) {
+void Simulation<Dim>::look_for_fault(const StepRound<Dim>& round, int urgency) {
   if (fault_urgency_ > 0 || (std::isfinite(speeds_.wave) && std::isfinite(speeds_.point))) return;
   const Fault fault = find_fault(patches_, bodies_);
   fault_urgency_ = 10 * urgency + fault.kind;
-  fault_ = fault.text;
+  fault_ = fmt::format("{} (seen after {})", fault.text, round.stages.back().name);
 }
 
 /// They take part in the rest of the step as mass without stress, and leave at its end.
@@ -64,9 +64,9 @@ void Simulation<Dim>::book_departures(Patch<Dim>& patch, const Piece<Dim>& piece
       });
 }
 
-#define CAIRN_INSTANTIATE(Dim)                             \
-  template void Simulation<Dim>::look_for_fault(int);      \
-  template void Simulation<Dim>::mark_faults(Piece<Dim>&); \
+#define CAIRN_INSTANTIATE(Dim)                                               \
+  template void Simulation<Dim>::look_for_fault(const StepRound<Dim>&, int); \
+  template void Simulation<Dim>::mark_faults(Piece<Dim>&);                   \
   template void Simulation<Dim>::book_departures(Patch<Dim>&, const Piece<Dim>&, std::span<const Departure>);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -93,7 +93,7 @@ void Simulation<Dim>::filter_noise() {
   std::vector<std::map<int, PieceMotion<Dim>>> motions(patches_.size());  // by body
 
   const auto keep = [&](std::size_t p, Patch<Dim>& patch) {
-    project_points(patch);
+    project_points(p, patch);
     for (auto& piece : patch.pieces) {
       if (is_rigid(piece)) continue;
       motions[p].emplace(piece.body, PieceMotion<Dim>(piece, columns, material_of(piece).density,

@@ -34,6 +34,9 @@ void report_run(const Simulation<Dim>& simulation, bool profile, RunSummary s, M
   if (profile) {
     const double steps = std::max(1.0, static_cast<double>(s.steps));
     say(stdout, "sent by rank 0: {:.1f} messages and {:.0f} bytes a step\n", mine[0] / steps, mine[1] / steps);
+    for (const auto& round : simulation.schedule())
+      say(stdout, "  after {}: {:.1f} messages and {:.0f} bytes a step\n", round.stages.back().name,
+          round.traffic.messages / steps, round.traffic.bytes / steps);
     say(stdout, "most sent by a rank: {:.1f} messages and {:.0f} bytes a step\n", most[0] / steps, most[1] / steps);
     const double mean = std::max(1.0, static_cast<double>(s.points)) / s.ranks;
     say(stdout, "balance: largest over mean points {:.3f}, patches moved {} times", static_cast<double>(most[2]) / mean,

@@ -128,6 +128,7 @@ template <int Dim>
 Simulation<Dim>::Simulation(const Case& c, MPI_Comm comm, const Checkpoint* from)
     : comm_(comm),
       solver_(c.solver),
+      schedule_(schedule_of(c.solver.stress_update)),
       parallel_(c.parallel),
       limits_(c.time),
       lattice_(make_lattice<Dim>(c.domain)),

@@ -46,46 +46,12 @@ constexpr std::int64_t sort_interval = 50;
 
 template <int Dim>
 void Simulation<Dim>::step(double longest) {
-  using P = Patch<Dim>;
-  const StressUpdate update = solver_.stress_update;
-  const bool first = update == StressUpdate::first || update == StressUpdate::both;
-  const bool again = projects_again();
-  const double share = update == StressUpdate::both ? 0.5 : 1.0;
-
   grow_cracks();
   split_bodies();
   choose_time_step(longest);
   begin_tools();
   filter_noise();
-  exchange_->begin_sums(transfer_.extras);
-  exchange_after([&](std::size_t, P& patch) { project_points(patch); });
-  if (first) {
-    exchange_->begin(&NodeBox<Dim>::force);
-    exchange_after([&](std::size_t p, P& patch) {
-      contact_before_update(p, patch);
-      strain_first(patch, share);
-    });
-    exchange_tractions();
-    look_for_fault(2);
-  }
-  const auto update_momentum = [&](std::size_t p, P& patch) {
-    first ? complete_forces(p, patch) : contact_before_update(p, patch);
-    contact_after_update(p, patch, !again);
-  };
-  if (again) {
-    exchange_->begin(&NodeBox<Dim>::velocity);
-    exchange_after([&](std::size_t p, P& patch) {
-      update_momentum(p, patch);
-      accelerate_points(patch);
-    });
-    push_tools();
-  }
-  aim_walls();
-  migrate_after([&](std::size_t p, P& patch) {
-    again ? project_again(p, patch) : update_momentum(p, patch);
-    finish_points(patch, share);
-  });
-  look_for_fault(1);
+  for (auto& round : schedule_) carry_out(round);
   if (keep_balance_) balance_ = weigh_bodies();
   receive_points();
   end_tools();
@@ -97,6 +63,38 @@ void Simulation<Dim>::step(double longest) {
   insert_bodies();
   if (gravity_.varies()) pull_by(gravity_.at(time_));
   if (parallel_.balance_every > 0 && steps_ % parallel_.balance_every == 0) balance();
+}
+
+template <int Dim>
+void Simulation<Dim>::carry_out(StepRound<Dim>& round) {
+  const Traffic before = traffic();
+  const auto compute = [&](std::size_t p, Patch<Dim>& patch) {
+    for (const auto& stage : round.stages) (this->*stage.compute)(p, patch);
+  };
+  switch (round.sent) {
+    case Sent::sums:
+      exchange_->begin_sums(transfer_.extras);
+      exchange_after(compute);
+      break;
+    case Sent::forces:
+      exchange_->begin(&NodeBox<Dim>::force);
+      exchange_after(compute);
+      exchange_tractions();
+      look_for_fault(round, 2);
+      break;
+    case Sent::momenta:
+      exchange_->begin(&NodeBox<Dim>::velocity);
+      exchange_after(compute);
+      push_tools();
+      break;
+    case Sent::points:
+      aim_walls();
+      migrate_after(compute);
+      look_for_fault(round, 1);
+      break;
+  }
+  round.traffic.messages += traffic().messages - before.messages;
+  round.traffic.bytes += traffic().bytes - before.bytes;
 }
 
 template <int Dim>
@@ -123,7 +121,7 @@ void Simulation<Dim>::choose_time_step(double longest) {
 }
 
 template <int Dim>
-void Simulation<Dim>::project_points(Patch<Dim>& patch) {
+void Simulation<Dim>::project_points(std::size_t /*p*/, Patch<Dim>& patch) {
   const auto time = timers_.measure(Stage::project);
   find_cracks(patch);
   for (auto& piece : patch.pieces)
@@ -167,7 +165,7 @@ void Simulation<Dim>::contact_before_update(std::size_t p, Patch<Dim>& patch) {
 }
 
 template <int Dim>
-void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
+void Simulation<Dim>::strain_first(std::size_t p, Patch<Dim>& patch) {
   using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::stress);
   for (auto& piece : patch.pieces) {
@@ -181,11 +179,12 @@ void Simulation<Dim>::strain_first(Patch<Dim>& patch, double share) {
       std::fill(piece.nodes.force.begin(), piece.nodes.force.end(), 0.0);
     else
       update_guarded(piece, [&](double part, SpeedLimits& speeds) {
-        update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, part * share * dt_, speeds);
+        update_stress_and_force(piece, lattice_, transfer_, material.law, material.density, part * strain_share() * dt_,
+                                speeds);
       });
     if (!projects_again()) velocities_.take_back(piece.nodes.velocity);
   });
-  find_tractions(&patch - patches_.data());
+  find_tractions(p);
 }
 
 template <int Dim>
@@ -198,7 +197,8 @@ void Simulation<Dim>::complete_forces(std::size_t p, Patch<Dim>& patch) {
 }
 
 template <int Dim>
-void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, bool last) {
+void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch) {
+  const bool last = !projects_again();
   {
     const auto time = timers_.measure(Stage::contact);
     sweeps_[p].second_pass(patch, lattice_, contact_, dt_, last);
@@ -213,7 +213,7 @@ void Simulation<Dim>::contact_after_update(std::size_t p, Patch<Dim>& patch, boo
 }
 
 template <int Dim>
-void Simulation<Dim>::accelerate_points(Patch<Dim>& patch) {
+void Simulation<Dim>::accelerate_points(std::size_t /*p*/, Patch<Dim>& patch) {
   using C = PointColumns<Dim>;
   const auto time = timers_.measure(Stage::update);
   for_pieces(patch, {{C::position, C::deformation}, {C::volume, C::state}}, [&](Piece<Dim>& piece) {
@@ -242,15 +242,14 @@ void Simulation<Dim>::project_again(std::size_t p, Patch<Dim>& patch) {
 /// The last pass over the points: what is left to do with them, and they move. Those that left the patch are taken out;
 /// a piece that kept all of its points is projected for the next step at once, while they are in the cache.
 template <int Dim>
-void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
+void Simulation<Dim>::finish_points(std::size_t p, Patch<Dim>& patch) {
   using C = PointColumns<Dim>;
   const bool strained = solver_.stress_update == StressUpdate::first;
-  if (!patch.cracks.empty())
-    face_motions_[&patch - patches_.data()] = find_face_velocities(patch.cracks, surroundings_of(patch));
+  if (!patch.cracks.empty()) face_motions_[p] = find_face_velocities(patch.cracks, surroundings_of(patch));
   const auto time = timers_.measure(strained ? Stage::update : Stage::stress);
   for_pieces(patch, {{C::position, strained ? C::state : all_columns}}, [&](Piece<Dim>& piece) {
     damp(patch, piece);
-    finish_piece(patch, piece, share);
+    finish_piece(patch, piece);
     patch.ledger.stopped += static_cast<double>(std::exchange(speeds_.stopped, 0));
     if (!projects_again()) motions_.take_back(piece.nodes.motion), velocities_.take_back(piece.nodes.velocity);
     if (!marked_ && all_inside(piece, lattice_, patch.id)) {
@@ -263,7 +262,7 @@ void Simulation<Dim>::finish_points(Patch<Dim>& patch, double share) {
 }
 
 template <int Dim>
-void Simulation<Dim>::finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share) {
+void Simulation<Dim>::finish_piece(Patch<Dim>& patch, Piece<Dim>& piece) {
   const auto& material = material_of(piece);
   double& lost = patch.ledger.blended_and_spun;
   if (is_rigid(piece)) {
@@ -281,8 +280,8 @@ void Simulation<Dim>::finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double 
     velocity_from_motion(piece);
   }
   update_guarded(piece, [&](double part, SpeedLimits& speeds) {
-    update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, part * share * dt_, part * dt_,
-                           speeds);
+    update_stress_and_move(piece, lattice_, transfer_, material.law, material.density, part * strain_share() * dt_,
+                           part * dt_, speeds);
   });
 }
 

@@ -125,7 +125,7 @@ double Simulation<Dim>::find_motion() {
   std::vector<PatchLedger> ledgers;
   for (const auto& patch : patches_) ledgers.push_back(patch.ledger);
   exchange_->begin_sums(transfer_.extras);
-  exchange_after([&](std::size_t, Patch<Dim>& patch) { project_points(patch); });
+  exchange_after([&](std::size_t p, Patch<Dim>& patch) { project_points(p, patch); });
   for_patches([&](std::size_t p, Patch<Dim>& patch) {
     exchange_->add(patch, p);
     mirror_sums(patch, lattice_, contact.faces);

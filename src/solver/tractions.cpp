@@ -131,7 +131,7 @@ template <int Dim>
 void Simulation<Dim>::find_tractions(std::size_t p) {
   if (traction_laws_.empty()) return;
   constexpr int parts = 8;
-  const double share = solver_.stress_update == StressUpdate::both ? 0.5 : 1.0;
+  const double share = strain_share();
   const auto traction = [&](const CrackPoint<Dim>& point, const Vec<Dim>& ahead) -> Vec<Dim> {
     const TractionLaw& law = *traction_laws_[point.crack];
     const Vec<Dim> way = (ahead - point.opening()) / share;

@@ -215,6 +215,24 @@ def test_scripts(cairn: Program, here: Path):
         expect_code(cairn(name, *arguments, cwd=here), code, "nothing")
 
 
+def test_explain(cairn: Program, here: Path):
+    """--explain names the stages of each scheme and what is sent, and writes nothing."""
+    stages = {"last": 4, "first": 6, "both": 8, "modified_last": 6}
+    passes = {"last": 2, "first": 3, "both": 4, "modified_last": 3}
+    for update, count in stages.items():
+        for ranks in (1, 2):
+            done = cairn("run", ROOT / "cases" / "shear_small.toml", "--explain", *sets({"solver.stress_update": update}),
+                         ranks=ranks, cwd=here)
+            expect_code(done, 0)
+            out = done.out
+            expect(len(re.findall(r"^  [a-z]", out, re.MULTILINE)) == count + 2, out)  # with the step's length and the end
+            rounds = [int(n) for n in re.findall(r"-> (\d+) message", out)]
+            total, words = re.search(r"^(\d+) passes .*; (\d+) messages", out, re.MULTILINE).groups()
+            expect(int(total) == passes[update] and int(words) == sum(rounds), out)
+            expect((sum(rounds) > 0) == (ranks > 1), out)
+    expect(not list(here.iterdir()), f"--explain wrote {list(here.iterdir())}")
+
+
 def test_same_files(cairn: Program, here: Path):
     """Result files name the program and nothing of the run; another program's name makes no difference to results."""
     import h5py

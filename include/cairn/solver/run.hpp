@@ -25,4 +25,8 @@ struct RunSettings {
 /// or whatever set-up threw, on a rank that failed alone: then the others wait for it, and the job has to be ended.
 int run_case(Case c, const RunSettings& settings, MPI_Comm comm);
 
+/// Prints the stages of a step of the case, and what patches send between them, counted in its second step. Collective.
+/// \throws InputError, RunError as run_case
+void explain_step(const Case& c, MPI_Comm comm);
+
 }  // namespace cairn

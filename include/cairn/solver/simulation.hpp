@@ -14,6 +14,7 @@
 #include "cairn/parallel/distribution.hpp"
 #include "cairn/parallel/migration.hpp"
 #include "cairn/parallel/node_exchange.hpp"
+#include "cairn/solver/schedule.hpp"
 #include "cairn/solver/simulation_state.hpp"
 #include "cairn/solver/timers.hpp"
 #include "cairn/transfer/transfer.hpp"
@@ -116,6 +117,8 @@ class Simulation {
   int times_balanced() const { return times_balanced_; }
   double seconds_balancing() const { return seconds_balancing_; }  // of this rank, while patches moved
   const Traffic& traffic() const { return messages_->traffic(); }
+  /// What a step consists of, with what this rank sent for it so far.
+  const std::vector<StepRound<Dim>>& schedule() const { return schedule_; }
   /// What this rank has to tell of points that were dropped since the last time, a line each.
   std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
 
@@ -139,18 +142,22 @@ class Simulation {
   bool is_rigid(const Piece<Dim>& piece) const { return bodies_[piece.body].rigid; }
 
  private:
-  // The stages of a step, in order. All but the first and the last are those of one patch, the p-th of this rank;
-  // (*) begins with the sums over patches that the exchange before it brought.
+  // A step is choose_time_step, the rounds of its scheme, and receive_points.
+  static std::vector<StepRound<Dim>> schedule_of(StressUpdate update);
+  /// The stages of a round, patch by patch, and what is sent after them.
+  void carry_out(StepRound<Dim>& round);
   void choose_time_step(double longest);
-  void filter_noise();                                           // communicates, every so many steps
-  void project_points(Patch<Dim>& patch);                        // of pieces that `finish_points` could not
+  void filter_noise();  // communicates, every so many steps
+  // The stages, of the p-th patch of this rank; (*) begins with the sums over patches that the exchange before it
+  // brought.
+  void project_points(std::size_t p, Patch<Dim>& patch);         // of pieces that `finish_points` could not
   void contact_before_update(std::size_t p, Patch<Dim>& patch);  // (*)
-  void strain_first(Patch<Dim>& patch, double share);
+  void strain_first(std::size_t p, Patch<Dim>& patch);
   void complete_forces(std::size_t p, Patch<Dim>& patch);  // (*)
-  void contact_after_update(std::size_t p, Patch<Dim>& patch, bool last);
-  void accelerate_points(Patch<Dim>& patch);
+  void contact_after_update(std::size_t p, Patch<Dim>& patch);
+  void accelerate_points(std::size_t p, Patch<Dim>& patch);
   void project_again(std::size_t p, Patch<Dim>& patch);  // (*)
-  void finish_points(Patch<Dim>& patch, double share);
+  void finish_points(std::size_t p, Patch<Dim>& patch);
   void receive_points();      // communicates
   void exchange_tractions();  // communicates, where faces of cracks pull each other; before complete_forces
   void move_cracks();         // communicates, where there are any
@@ -249,6 +256,8 @@ class Simulation {
   bool projects_again() const {
     return solver_.stress_update == StressUpdate::both || solver_.stress_update == StressUpdate::modified_last;
   }
+  /// Of a step, of each of its strains.
+  double strain_share() const { return solver_.stress_update == StressUpdate::both ? 0.5 : 1.0; }
   void lay_out(Patch<Dim>& patch, Piece<Dim>& piece);
   void project_piece(Patch<Dim>& patch, Piece<Dim>& piece);
   void project_ahead(Patch<Dim>& patch, Piece<Dim>& piece);
@@ -292,7 +301,7 @@ class Simulation {
   CrackSurroundings<Dim> surroundings_of(const Patch<Dim>& patch) {
     return {patch, lattice_, segments_of(patch), cracks_, crack_densities_, solver_.stress_update};
   }
-  void finish_piece(Patch<Dim>& patch, Piece<Dim>& piece, double share);
+  void finish_piece(Patch<Dim>& patch, Piece<Dim>& piece);
   void turn_stress(Piece<Dim>& piece);
   void move_rigid(Piece<Dim>& piece);
   bool turns_rigidly(const Piece<Dim>& piece) const {
@@ -302,7 +311,7 @@ class Simulation {
   const TransferSettings<Dim>& transfer_of(const Piece<Dim>& piece) const {
     return turns_rigidly(piece) ? transfer_of_turning_ : transfer_;
   }
-  void look_for_fault(int urgency);
+  void look_for_fault(const StepRound<Dim>& round, int urgency);
   /// Updates a piece by update(share of the step, speeds). Where lost points are dropped, those that it turned inside
   /// out are marked and put to rest, and the update is made once more for no time, for forces and speeds without them.
   template <class F>
@@ -323,6 +332,7 @@ class Simulation {
   MPI_Comm comm_;
   int rank_ = 0, ranks_ = 1;
   SolverOptions solver_;
+  std::vector<StepRound<Dim>> schedule_;
   ParallelOptions parallel_;
   Time limits_;
   Lattice<Dim> lattice_;
