@@ -48,7 +48,7 @@ struct Viscoelastic {
   /// One branch, and what a step makes of it: h <- decay R h R^T + gain dev D dt; the dissipation is a quadratic form
   /// in the rotated h and the increment dev D dt.
   struct Branch {
-    double shear, time;  // [Pa], [s]
+    double shear = 0, time = 0;  // [Pa], [s]
     double decay = 1, gain = 2 * shear;
     double old_old = 0, old_new = 0, new_new = 0;
   };
