@@ -121,10 +121,10 @@ std::string edit_values(hid_t dataset, const std::string& name, Random& random) 
     std::swap_ranges(place, place + v.width(), v.bytes.data() + other * v.width());
   } else if (kind == 1) {
     place[random.below(v.width())] ^= static_cast<std::byte>(1 + random.below(255));
-  } else if (H5Tget_class(v.type) == H5T_FLOAT) {
-    std::memcpy(place, &real, sizeof real);
+  } else if (const auto single = static_cast<float>(real); H5Tget_class(v.type) == H5T_FLOAT) {
+    v.width() == sizeof single ? std::memcpy(place, &single, sizeof single) : std::memcpy(place, &real, sizeof real);
   } else {
-    std::memcpy(place, &integer, v.width());
+    std::memcpy(place, &integer, std::min(v.width(), sizeof integer));
   }
   if (kind == 3)
     for (std::size_t i = 0; i < v.size(); ++i) std::memmove(v.bytes.data() + i * v.width(), place, v.width());
