@@ -69,11 +69,11 @@ def write_spheres(folder: Path, side: int, periodic: str = "false") -> results.R
 def seen(run: results.Run, **look):
     """The camera, what it sees, and where that is in space [m]."""
     scene = Scene(run, Look(**look), run.frames)
-    buffers, surface, owner = scene.buffers(run.frames[0])
+    buffers = scene.buffers(run.frames[0])
     row, column = np.nonzero(buffers.hit)
     camera = scene.camera
     turned = camera.unproject(column + 0.5, row + 0.5, buffers.depth[buffers.hit])
-    return scene, buffers, turned @ camera.basis + camera.target, owner[buffers.surfel[buffers.hit]]
+    return scene, buffers, turned @ camera.basis + camera.target, buffers.owner[buffers.hit]
 
 
 def test_surface(cairn: Program, scratch: Path) -> None:
@@ -91,6 +91,18 @@ def test_surface(cairn: Program, scratch: Path) -> None:
         if not look.get("perspective"):
             area = buffers.hit.sum() / scene.camera.scale**2 / (np.pi / 4)
             expect(abs(area - 1) < 0.05, f"{look}: the outline's area is {area:.3f} of a disk's")
+            rough = ragged(buffers.hit) / scene.camera.scale / SPACING
+            expect(rough < 0.12, f"{look}: the outline's radius varies by {rough:.3f} spacings")
+            print(f"{look}: off {np.percentile(off, 95):.2f} spacings, {np.percentile(angle, 90):.1f} degrees, area {area:.3f}, rough {rough:.3f}")
+
+
+def ragged(hit: np.ndarray) -> float:
+    """Standard deviation of an outline's distance from its middle, of what a pixel more or less does not make [pixels]."""
+    rim = hit[1:-1, 1:-1] & ~(hit[:-2, 1:-1] & hit[2:, 1:-1] & hit[1:-1, :-2] & hit[1:-1, 2:])
+    place = np.argwhere(rim) - np.argwhere(hit[1:-1, 1:-1]).mean(axis=0)
+    radius, angle = np.linalg.norm(place, axis=1), np.arctan2(place[:, 0], place[:, 1])
+    sector = ((angle / np.pi + 1) * 90).astype(int) % 180  # two degrees each
+    return float((np.bincount(sector, radius) / np.maximum(np.bincount(sector), 1)).std())
 
 
 def test_cut(cairn: Program, scratch: Path) -> None:
