@@ -14,7 +14,7 @@ from camera import Camera
 from skin import Skin
 from surface import Plane
 
-CHUNK = 1 << 17  # lines of sight through cells that are worked on at a time
+CHUNK = 1 << 14  # lines of sight through cells that are worked on at a time, in the cache
 
 
 @dataclass
@@ -48,7 +48,7 @@ class _Rays:
         for axis in (1, 2, 3):
             low, high = np.take(terms, 0, axis), np.take(terms, 1, axis)
             terms = np.stack([low, high - low], axis)
-        self.terms = terms.reshape(-1, 8)
+        self.terms = np.ascontiguousarray(terms.reshape(-1, 8).T)
         half = 0.5 * (abs(camera.basis[None]) * skin.size[:, None]).sum(axis=2) * self.scale[:, None]
         grow = 0.0 if np.isinf(camera.distance) else 0.25
         self.box = self._box(half[:, 0] * (1 + grow), half[:, 1] * (1 + grow))
@@ -151,7 +151,7 @@ def paint(skin: Skin, camera: Camera, planes: list[Plane], valued: bool) -> Buff
         cell, column, row = cell[open_], column[open_], row[open_]
         chosen, start, way, near, far, cut = rays.spans(cell, column, row)
         cell, pixel = cell[chosen], row[chosen] * camera.width + column[chosen]
-        terms = rays.terms[cell].T
+        terms = rays.terms[:, cell]
         first = rays.level(terms, start, way, near)
         root = _first_root(first, rays.level(terms, start, way, 0.5 * (near + far)), rays.level(terms, start, way, far))
         face = cut & (first > 0)
