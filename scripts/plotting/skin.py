@@ -114,7 +114,7 @@ def nearest(camera: Camera, position: np.ndarray, spacing: float, planes: list[P
     for plane in planes:
         above = plane.above(position)
         below &= above < 0
-        kept &= above < 2 * SPACING_TO_CELL * spacing
+        kept &= above < 3.5 * SPACING_TO_CELL * spacing  # as far as nodes of cells on the plane see
     front = Front(camera, position[below] if planes else position, spacing)
     return np.flatnonzero(kept & front.seen(position, 2.8 * SPACING_TO_CELL * spacing)), front
 
