@@ -133,7 +133,7 @@ def test_surfaces(cairn, here):
         flat = name.startswith(("lines", "drawing"))
         shape = f'type = "{"outline" if flat else "mesh"}", file = "{name}", unit = "m"'
         refused = 0
-        for what, form in damaged(content, 12):
+        for what, form in damaged(content, 4):
             (here / name).write_bytes(form)
             done = surface_files.check(cairn, here, shape, surface_files.HEAD_2D if flat else surface_files.HEAD_3D)
             expect(done.code in (0, 2), f"{name}, {what}: exit code {done.code}: {done.err[-300:]}")
