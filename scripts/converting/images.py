@@ -221,7 +221,8 @@ def read_nrrd(path):
     for key in ("type", "dimension", "sizes", "encoding"):
         if key not in head:
             raise InputError(f"{path}: has no '{key}'")
-    count = int(head["dimension"])
+    head["encoding"] = head["encoding"].lower()
+    count, = numbers(head["dimension"], 1, f"{path}: dimension", int)
     if count not in (2, 3):
         raise InputError(f"{path}: has {count} dimensions; images have 2 and volumes 3")
     sizes, code = numbers(head["sizes"], count, f"{path}: sizes", int), nrrd_type(head["type"], path)
@@ -263,7 +264,7 @@ def read_nifti(path):
             data = gzip.decompress(data)
         except (EOFError, OSError, zlib.error) as error:
             raise InputError(f"{path}: cannot be unpacked ({error}); it is cut off or damaged") from None
-    order = next((o for o in "<>" if len(data) >= 352 and struct.unpack(o + "i", data[:4])[0] == 348), None)
+    order = next((o for o in "<>" if len(data) >= 348 and struct.unpack(o + "i", data[:4])[0] == 348), None)
     if order is None or data[344:347] not in (b"n+1", b"ni1"):
         raise InputError(f"{path}: is no NIfTI-1 file (a head of 348 bytes)")
     dims = struct.unpack(order + "8h", data[40:56])
