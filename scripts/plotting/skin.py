@@ -181,3 +181,15 @@ def _part(lattice: Lattice, level, position, volume, value, planes, front, chose
         few &= chosen
     return Skin(cells.centre, np.broadcast_to(lattice.size, cells.centre.shape), lattice.bodies[cells.owner],
                 levels[corner].astype(np.float32), corner, table, np.flatnonzero(few))
+
+
+def depths(lattice: Lattice, volume: np.ndarray, spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """For each point the outward normal (N x 3) of the surface near it, and how deep it lies beneath [m]; zero and
+    infinite where no surface is near."""
+    radius = np.cbrt(np.bincount(lattice.owner, volume) / (4 / 3 * np.pi))[lattice.owner]
+    level = lattice.to_points(_levels(lattice, volume, radius))
+    away = lattice.to_points(lattice.away(volume)) / lattice.size.prod()
+    length = np.sqrt(np.einsum("ij,ij->i", away, away))
+    near = (level < 0.9 * DEEPEST) & (length > 0.01)
+    normal = np.where(near[:, None], away / np.maximum(length, 1e-300)[:, None], 0)
+    return normal, np.where(near, np.maximum(level * lattice.size.mean(), 0.2 * spacing), np.inf)
