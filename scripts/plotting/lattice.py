@@ -58,8 +58,7 @@ class Lattice:
         self._corners, self._within = corners, within
         self.node_of_points = at.reshape(keys.shape).astype(np.int32)[of_point]  # of each point and corner
         shares = np.stack([1 - within, within])
-        self._factors = [[shares[corner[d], :, d] for d in range(dimension)] for corner in corners]
-        self._weight = [np.multiply.reduce(factors) for factors in self._factors]
+        self._weight = [np.multiply.reduce([shares[corner[d], :, d] for d in range(dimension)]) for corner in corners]
 
     def to_nodes(self, values: np.ndarray, chosen=slice(None)) -> np.ndarray:
         """sum_p N_ip value_p, for values (N) or (N x K); `chosen`: of these points only."""
@@ -79,11 +78,6 @@ class Lattice:
             found = found + (weight[:, None] if value.ndim > 1 else weight) * value
         return found
 
-    def from_nodes(self, chosen=slice(None)):
-        """For each of the nodes around points: N_ip, the node, and the points' places from it (N x D) [m]."""
-        for k, (corner, weight) in enumerate(zip(self._corners, self._weight)):
-            yield weight[chosen], self.node_of_points[chosen, k], (self._within[chosen] - corner) * self.size
-
     def away(self, volume: np.ndarray) -> np.ndarray:
         """sum_p N_ip V_p (x_i - x_p) / h (nodes x D), away from the matter around a node."""
         sums = np.zeros((self._within.shape[1], self.nodes))
@@ -92,20 +86,6 @@ class Lattice:
             for d, row in enumerate(sums):
                 row += np.bincount(self.node_of_points[:, k], weights=weight * (corner[d] - self._within[:, d]), minlength=self.nodes)
         return sums.T
-
-    def gradient(self, nodal: np.ndarray, chosen=slice(None)) -> np.ndarray:
-        """sum_i grad N_ip value_i (N x D) [1/m], for nodal values (nodes)."""
-        dimension = len(self.size)
-        found = []
-        for d in range(dimension):
-            total = 0
-            for k, factors in enumerate(self._factors):
-                value = nodal[self.node_of_points[chosen, k]] * (2 * self._corners[k][d] - 1)
-                for e in range(dimension):
-                    value = value * factors[e][chosen] if e != d else value
-                total = total + value
-            found.append(total / self.size[d])
-        return np.stack(found, 1)
 
     def cells_around(self, inside: np.ndarray) -> Cells:
         """All cells with a corner that is one of the nodes `inside` (bool)."""

@@ -163,8 +163,6 @@ def test_periodic_lattice(cairn: Program, scratch: Path) -> None:
     value = lattice.to_points(lattice.to_nodes(x[:, 1] * volume) / total)
     middle = inner & (np.abs(x[:, 1] - 0.5) < 0.3)
     expect(np.abs(value - x[:, 1])[middle].max() < 1e-12, "a linear field is not kept")
-    slope = lattice.gradient(lattice.to_nodes(x[:, 1] * volume) / total)[middle]
-    expect(np.allclose(slope, (0, 1)), f"gradient {slope[0]}")
 
 
 def test_camera(cairn: Program, scratch: Path) -> None:
