@@ -155,15 +155,22 @@ def read_msh(text, name):
         raise InputError(f"{name}: is damaged: {error}") from None
     dimension = 3 if any(kind == 4 for kind, _, _ in rows) else 2
     groups = {}
+    if short := next((number for number, place in points.items() if len(place) != 3), None):
+        raise InputError(f"{name}: node {short} has {len(points[short])} coordinates instead of 3; it is cut off or damaged")
     for kind, group, corners in rows:
         if kind == (4 if dimension == 3 else 2):
+            if len(corners) < CORNERS[kind]:
+                raise InputError(f"{name}: an element of {CORNERS[kind]} nodes names {len(corners)}; it is cut off or damaged")
             groups.setdefault(group, []).append(corners[:CORNERS[kind]])
     if not groups:
         raise InputError(f"{name}: holds neither triangles nor tetrahedra")
     if missing := next((c for cs in groups.values() for e in cs for c in e if c not in points), None):
         raise InputError(f"{name}: an element names node {missing}, which is not there")
-    return dimension, [(names.get((dimension, group), str(group)), boundary(elements, points, dimension))
-                       for group, elements in sorted(groups.items())]
+    try:
+        return dimension, [(names.get((dimension, group), str(group)), boundary(elements, points, dimension))
+                           for group, elements in sorted(groups.items())]
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
 
 
 def boundary(elements, points, dimension):
@@ -188,6 +195,8 @@ def boundary(elements, points, dimension):
         line = [start]
         while to != start:
             line.append(to)
+            if to not in following:
+                raise InputError(f"the outline of a surface does not close at node {to}")
             to = following.pop(to)
         lines.append(np.array([points[c][:2] for c in line]))
     return lines

@@ -72,6 +72,8 @@ def add_xyz_frames(lines, name, frames):
         words_of, names = found.group(1).split(":"), []
         known = {"pos": ["x", "y", "z"], "velo": ["vx", "vy", "vz"], "vel": ["vx", "vy", "vz"]}
         for key, width in zip(words_of[::3], words_of[2::3]):
+            if not width.isdecimal() or len(width) > 3:
+                raise InputError(f"{name}:{at + 2}: Properties: '{key[:40]}' has '{width[:40]}' columns; that is no number below 1000")
             names += known.get(key, [key] if width == "1" else [f"{key}{i}" for i in range(int(width or 0))])
         frames.append((names, at + 3, lines[at + 2:at + 2 + count]))
         at += 2 + count

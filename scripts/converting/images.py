@@ -42,6 +42,8 @@ def contents(path):
             return file.read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError:  # what a damaged head can make of a name
+        raise InputError(f"{path}: is no name of a file") from None
 
 
 def natural(name):
@@ -96,7 +98,7 @@ def read_pages(path):
         with Image.open(path) as image:
             plane, apart = tiff_lengths(image)
             pages = [plane_of(page, f"{path}: page {i}") for i, page in enumerate(ImageSequence.Iterator(image))]
-    except (OSError, SyntaxError, ValueError, EOFError) as error:
+    except (OSError, SyntaxError, ValueError, EOFError, KeyError, TypeError, OverflowError, MemoryError) as error:  # Pillow's own of damaged tags
         try:
             import tifffile  # pylint: disable=import-outside-toplevel
             pages, plane, apart = list(np.atleast_3d(tifffile.imread(path))), None, None
@@ -104,6 +106,8 @@ def read_pages(path):
             raise InputError(f"{path}: cannot be read as an image: {error}") from None
         except Exception as other:  # whatever tifffile finds
             raise InputError(f"{path}: cannot be read as an image: {error}; {other}") from None
+    if not pages:
+        raise InputError(f"{path}: holds no pages; it is cut off or damaged")
     for i, page in enumerate(pages):
         if page.shape != pages[0].shape:
             raise InputError(f"{path}: page {i} is {page.shape[1]} x {page.shape[0]}, page 0 is "
@@ -217,7 +221,8 @@ def read_nrrd(path):
     for key in ("type", "dimension", "sizes", "encoding"):
         if key not in head:
             raise InputError(f"{path}: has no '{key}'")
-    count = int(head["dimension"])
+    head["encoding"] = head["encoding"].lower()
+    count, = numbers(head["dimension"], 1, f"{path}: dimension", int)
     if count not in (2, 3):
         raise InputError(f"{path}: has {count} dimensions; images have 2 and volumes 3")
     sizes, code = numbers(head["sizes"], count, f"{path}: sizes", int), nrrd_type(head["type"], path)
@@ -259,7 +264,7 @@ def read_nifti(path):
             data = gzip.decompress(data)
         except (EOFError, OSError, zlib.error) as error:
             raise InputError(f"{path}: cannot be unpacked ({error}); it is cut off or damaged") from None
-    order = next((o for o in "<>" if len(data) >= 352 and struct.unpack(o + "i", data[:4])[0] == 348), None)
+    order = next((o for o in "<>" if len(data) >= 348 and struct.unpack(o + "i", data[:4])[0] == 348), None)
     if order is None or data[344:347] not in (b"n+1", b"ni1"):
         raise InputError(f"{path}: is no NIfTI-1 file (a head of 348 bytes)")
     dims = struct.unpack(order + "8h", data[40:56])
@@ -324,9 +329,11 @@ def read_tesr(path):
     if not mark or not body:
         raise InputError(f"{path}: has no section **general or **data; it is cut off")
     count = int(mark.group(1))
-    words = data[mark.end():body.start()].split()
-    sizes = [int(w) for w in words[:count]]
-    spacing = [float(w) for w in words[count:2 * count]]
+    words = data[mark.end():body.start()].decode("latin-1").split()
+    if count not in (2, 3):
+        raise InputError(f"{path}: **general: {count} dimensions; images have 2 and volumes 3")
+    sizes = numbers(" ".join(words[:count]), count, f"{path}: **general", int)
+    spacing = numbers(" ".join(words[count:2 * count]), count, f"{path}: **general")
     origin = re.search(rb"\*origin\s+([^*]*)", data[mark.end():body.start()])
     low = numbers(origin.group(1).decode(), count, f"{path}: *origin") if origin else [0.0] * count
     form, rest = body.group(1).decode(), data[body.end():]
@@ -336,7 +343,10 @@ def read_tesr(path):
         words = rest.split(b"***end")[0].split()
         if len(words) != int(np.prod(sizes)):
             raise InputError(f"{path}: holds {len(words)} voxels; {int(np.prod(sizes))} are needed: it is cut off")
-        voxels = np.array(words, dtype=np.int64).reshape(sizes[::-1])
+        try:
+            voxels = np.array(words, dtype=np.int64).reshape(sizes[::-1])
+        except (ValueError, OverflowError) as error:
+            raise InputError(f"{path}: **data: {error}; it is damaged") from None
     elif form in ("binary8", "binary16", "binary32"):
         code = {"binary8": "u1", "binary16": "<i2", "binary32": "<i4"}[form]
         needed = int(np.prod(sizes)) * np.dtype(code).itemsize

@@ -185,7 +185,7 @@ def extended_xyz(moments: list[Moment], folder: Path) -> list[str]:
                        f"Step={moment.frame.step} Properties=species:S:1:{kinds}\n")
             for row in zip(*[values.tolist() for _, _, values in parts]):
                 values = [value for cells in row for value in cells]
-                file.write("G " + " ".join(f"{v:.9g}" if isinstance(v, float) else str(v) for v in values) + "\n")
+                file.write("X " + " ".join(f"{v:.9g}" if isinstance(v, float) else str(v) for v in values) + "\n")
     return ["grains.xyz"]
 
 

@@ -122,6 +122,7 @@ class Run:
         if self.failed:
             self.title += " - THE RUN FAILED"
         self.frames = [Frame(path) for path in sorted(self.folder.glob("particles_*.vtkhdf"))]
+        self._smoothed: tuple[Path, np.ndarray] | None = None  # the last, as a scale and a picture want it one after the other
         self.raw_stress = False  # pictures show the points' stress as computed
         self.look = Look()
 
@@ -184,7 +185,11 @@ class Run:
     def stress(self, frame: Frame) -> np.ndarray:
         """Stress to look at (N x 6: xx yy zz xy yz xz) [Pa]."""
         name = self.stress_name(frame)
-        return smoothed(self, frame, frame.field("stress")) if name == "stress, smoothed" else frame.field(name)
+        if name != "stress, smoothed":
+            return frame.field(name)
+        if self._smoothed is None or self._smoothed[0] != frame.path:
+            self._smoothed = frame.path, smoothed(self, frame, frame.field("stress"))
+        return self._smoothed[1]
 
     def has_stress(self, frame: Frame) -> bool:
         """Whether there is a stress to look at."""

@@ -11,6 +11,7 @@ LIGHT = np.array((-0.38, 0.58, 0.72)) / np.linalg.norm((-0.38, 0.58, 0.72))  # t
 AMBIENT, DIFFUSE, GLOSS = 0.52, 0.55, 0.10
 SHADOW = 0.55  # of the diffuse light, taken by a full shadow
 CREVICE = 0.75  # of the ambient light, taken where nothing of the sky is seen
+REACH = 6.0  # of crevices, in spacings
 LINE = 0.45  # brightness of silhouettes
 TURN = 2.399963  # the golden angle: directions spread evenly however many there are
 RING = [(np.cos(TURN * k), np.sin(TURN * k), (k + 1) / 12) for k in range(12)]  # and the share of the reach there
@@ -28,67 +29,68 @@ def box_blur(picture: np.ndarray, radius: int) -> np.ndarray:
     return picture
 
 
-def crevices(buffers: Buffers, camera: Camera, reach: float, blur: int) -> np.ndarray:
-    """Share of the sky (0 to 1) that matter within `reach` [m] hides, for each pixel."""
-    hidden = np.zeros(buffers.depth.shape)
-    depth = np.where(buffers.hit, buffers.depth, -1e30)
+def crevices(buffers: Buffers, camera: Camera, reach: float) -> np.ndarray:
+    """Share of the sky (0 to 1) that matter within `reach` [m] hides, for each pixel. Found for each second pixel along
+    both axes, as it varies slowly."""
+    depth = np.where(buffers.hit, buffers.depth, -1e30)[::2, ::2].astype(np.float32)
+    normal = buffers.normal[::2, ::2].astype(np.float32)
     rows, columns = depth.shape
-    slope = -buffers.normal[..., :2] / np.maximum(buffers.normal[..., 2:], 0.25)
+    hidden = np.zeros(depth.shape, np.float32)
+    slope_right, slope_up = (-normal[..., k] / np.maximum(normal[..., 2], np.float32(0.25)) for k in (0, 1))
     for right, up, share in RING:
-        far = reach * share
-        j, i = int(round(far * right * camera.scale)), int(round(-far * up * camera.scale))
+        far = np.float32(reach * share)
+        j, i = int(round(0.5 * far * right * camera.scale)), int(round(-0.5 * far * up * camera.scale))
         if not (i or j) or abs(i) >= rows or abs(j) >= columns:
             continue
         here = (slice(max(0, -i), rows - max(0, i)), slice(max(0, -j), columns - max(0, j)))
         there = (slice(max(0, i), rows - max(0, -i)), slice(max(0, j), columns - max(0, -j)))
-        level = depth[here] + far * (right * slope[here][..., 0] + up * slope[here][..., 1])
-        rise = (depth[there] - level) / far
-        hidden[here] += np.clip(rise - 0.15, 0, 1) * np.clip(3 - rise, 0, 1)
-    return np.clip(box_blur(hidden / (0.4 * len(RING)), blur), 0, 1)
+        rise = (depth[there] - depth[here]) / far - np.float32(right) * slope_right[here] - np.float32(up) * slope_up[here]
+        hidden[here] += np.minimum(np.maximum(rise - np.float32(0.15), 0), 1) * np.minimum(np.maximum(3 - rise, 0), 1)
+    blurred = box_blur(hidden / np.float32(0.4 * len(RING)), 2)
+    whole = np.repeat(np.repeat(blurred, 2, axis=0), 2, axis=1)[: buffers.depth.shape[0], : buffers.depth.shape[1]]
+    return np.clip(box_blur(whole, 1), 0, 1)
 
 
 class Shadows:
-    """What lies in the shadow of the surface, with soft edges."""
+    """What lies in the shadow of matter, with soft edges."""
 
-    def __init__(self, position: np.ndarray, normal: np.ndarray, radius: float):
-        """`position` (N x 3) [m] and `normal` of all surfels, in camera axes."""
-        position = position[normal @ LIGHT > -0.05]
+    def __init__(self, position: np.ndarray, spacing: float):
+        """`position` (N x 3) [m] of all points, in camera axes."""
         side = np.cross(LIGHT, (0.0, 1.0, 0.0))
         self.basis = np.stack([side / np.linalg.norm(side), np.cross(side / np.linalg.norm(side), LIGHT), LIGHT])
-        self.radius = radius
-        self.tile = 0.7 * radius
+        self.spacing = spacing
+        self.tile = 0.8 * spacing
         turned = position @ self.basis.T
-        self.low = turned[:, :2].min(axis=0) - 3 * radius if len(turned) else np.zeros(2)
-        place = np.floor((turned[:, :2] - self.low) / self.tile).astype(int)
+        self.low = turned[:, :2].min(axis=0) - 3 * spacing if len(turned) else np.zeros(2)
+        place = ((turned[:, :2] - self.low) / self.tile).astype(np.int32)
         shape = place.max(axis=0, initial=0) + 5
-        self.map = np.full(shape, -np.inf)
-        order = np.argsort(turned[:, 2], kind="stable")
-        for i in (-1, 0, 1):
-            for j in (-1, 0, 1):
-                if i and j:
-                    continue
-                tiles = np.full(shape, -np.inf)
-                tiles[place[order, 0] + i, place[order, 1] + j] = turned[order, 2] - (0.3 * radius if i or j else 0)
-                np.maximum(self.map, tiles, out=self.map)
+        order = np.argsort(turned[:, 2].astype(np.float32))
+        tiles = np.full(shape, -np.inf)
+        tiles[place[order, 0], place[order, 1]] = turned[order, 2]
+        self.map = tiles.copy()
+        for axis in (0, 1):
+            for way in (-1, 1):  # tiles at the edges are empty
+                np.maximum(self.map, np.roll(tiles, way, axis) - 0.3 * spacing, out=self.map)
 
     def share(self, position: np.ndarray) -> np.ndarray:
         """How much (0 to 1) of the light is kept from positions (N x 3) in camera axes."""
         turned = position @ self.basis.T
         place = (turned[:, :2] - self.low) / self.tile
-        limit = turned[:, 2] + 2.2 * self.radius
-        total = np.zeros(len(position))
+        limit = turned[:, 2] + 2.2 * self.spacing
+        total = np.zeros(len(position), np.float32)
         offsets = (-1.2, -0.4, 0.4, 1.2)
-        for a in offsets:
-            for b in offsets:
-                i = np.clip((place[:, 0] + a).astype(np.int32), 0, self.map.shape[0] - 1)
-                j = np.clip((place[:, 1] + b).astype(np.int32), 0, self.map.shape[1] - 1)
-                total += self.map[i, j] > limit
+        wide, flat = self.map.shape[1], self.map.ravel()
+        rows = [np.clip((place[:, 0] + a).astype(np.int32), 0, self.map.shape[0] - 1) * wide for a in offsets]
+        columns = [np.clip((place[:, 1] + b).astype(np.int32), 0, wide - 1) for b in offsets]
+        for i in rows:
+            for j in columns:
+                total += flat[i + j] > limit
         return total / len(offsets) ** 2
 
 
-def silhouettes(buffers: Buffers, owner: np.ndarray, step: float) -> np.ndarray:
+def silhouettes(buffers: Buffers, step: float) -> np.ndarray:
     """Darkness (0 to 1) of lines between bodies, against the background, and where depth jumps by `step` [m]."""
-    shown = np.where(buffers.hit, owner[buffers.surfel], -1)
+    shown = buffers.owner
     depth = np.where(buffers.hit, buffers.depth, -1e30)
     steep = step / np.maximum(buffers.normal[..., 2], 0.15)  # a slope is no jump
     line = np.zeros(shown.shape)
@@ -102,28 +104,26 @@ def silhouettes(buffers: Buffers, owner: np.ndarray, step: float) -> np.ndarray:
     return line
 
 
-def shade(buffers: Buffers, camera: Camera, colour: np.ndarray, cut: np.ndarray, shadows: Shadows, line: np.ndarray,
-          radius: float, grain: float, exact: bool) -> np.ndarray:
-    """Picture (rows x columns x 3, 0 to 1) from the colour of each pixel and the silhouettes (`line`); `grain` [m]: how
-    far crevices reach.
+def shade(buffers: Buffers, camera: Camera, colour: np.ndarray, shadows: Shadows, line: np.ndarray, spacing: float,
+          exact: bool) -> np.ndarray:
+    """Picture (rows x columns x 3, 0 to 1) from the colour of each pixel and the silhouettes (`line`).
 
     `exact`: colours are values, to be read against a scale, so that light changes them little and cut faces not at all.
     """
     hit = buffers.hit
     row, column = np.nonzero(hit)
-    normal, surfel = buffers.normal[hit], buffers.surfel[hit]
+    normal = buffers.normal[hit]
     position = camera.unproject(column + 0.5, row + 0.5, buffers.depth[hit])
     bright = np.clip(normal @ LIGHT, 0, 1)
-    blur = int(np.clip(0.4 * radius * camera.scale, 1, 6))
-    shadow = np.zeros(hit.shape)
-    shadow[hit] = shadows.share(position + normal * radius)
-    shadow = box_blur(shadow, blur)[hit]
-    hidden = crevices(buffers, camera, grain, blur)[hit]
+    shadow = np.zeros(hit.shape, np.float32)
+    shadow[hit] = shadows.share(position + normal * spacing)
+    shadow = box_blur(shadow, int(np.clip(0.45 * spacing * camera.scale, 1, 6)))[hit]
+    hidden = crevices(buffers, camera, REACH * spacing)[hit]
     light = AMBIENT * (0.8 + 0.2 * normal[:, 1]) * (1 - CREVICE * hidden) + DIFFUSE * bright * (1 - SHADOW * shadow)
     gloss = GLOSS * np.clip(normal @ _halfway(), 0, 1) ** 40 * (1 - shadow)
     if exact:
         light, gloss = 0.35 + 0.65 * light, 0
-        light = np.where(cut[surfel], 1.0, light)
+        light = np.where(buffers.cut[hit], 1.0, light)
     picture = np.ones((*hit.shape, 3))
     picture[hit] = np.clip(colour[hit] * light[:, None] + np.reshape(gloss, (-1, 1)), 0, 1)
     return soften(picture * (1 - (1 - LINE) * line)[..., None], line)

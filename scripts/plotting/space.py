@@ -12,8 +12,10 @@ from canvas import Sheet, box_lines
 from look import Look
 from results import Frame, MissingData, Run
 from scalars import scalar, scale
-from surface import REACH, Plane, Surfels, lattice_of, surfels
-from zbuffer import Buffers, paint, paint_balls
+from skin import BALL, nearest, skin_of
+from surface import Plane
+from zbuffer import Buffers, add_balls, paint, paint_balls
+
 
 def _horizontal(planes: list[Plane], up: int) -> np.ndarray:
     """The planes' normals seen from above, summed."""
@@ -109,37 +111,47 @@ class Scene:
         else:
             self.colour = colours.of_run(run)
 
-    def buffers(self, frame: Frame) -> tuple[Buffers, Surfels, np.ndarray]:
-        """What is seen, the surface, and the body of each disc of it."""
-        run = self.run
+    def buffers(self, frame: Frame) -> Buffers:
+        """What is seen; owners are bodies."""
+        return self._seen(frame)[0]
+
+    def _seen(self, frame: Frame) -> tuple[Buffers, np.ndarray]:
+        """What is seen, and the points' positions."""
+        run, planes = self.run, self.look.planes
         if frame.points == 0:
             raise MissingData(f"{frame.path.name} holds no points")
         position = frame.field("position").astype(float)
         body = frame.field("body") if frame.has("body") else np.zeros(len(position), int)
         volume = frame.field("volume") if frame.has("volume") else np.full(len(position), run.point_spacing**3)
-        lattice = lattice_of(position, body, run.point_spacing, run.lower, run.upper, run.periodic)
-        surface = surfels(lattice, position, volume, run.point_spacing, self.look.planes)
-        owner = body[surface.point]
-        value = self.scalar.values(run, frame)[surface.point] if self.scalar else None
-        return paint(surface, self.camera, value, owner), surface, owner
+        value = self.scalar.values(run, frame) if self.scalar else None
+        chosen, front = nearest(self.camera, position, run.point_spacing, planes)
+        radius = np.cbrt(np.bincount(body, volume)[body[chosen]] / (4 / 3 * np.pi))
+        place, value = position[chosen], value if value is None else value[chosen]
+        skin = skin_of(place, volume[chosen], body[chosen], value, radius, run.point_spacing,
+                       (run.lower, run.at(frame).upper, run.periodic), planes, front)
+        seen = paint(skin, self.camera, planes, self.scalar is not None)
+        left = skin.ball[np.all([np.ones(len(skin.ball)), *[plane.above(place[skin.ball]) < 0 for plane in planes]], axis=0)]
+        if len(left):
+            size = np.full(len(left), BALL * run.point_spacing)
+            add_balls(seen, paint_balls(place[left], size, self.camera), body[chosen[left]], None if value is None else value[left])
+        return seen, position
 
-    def _pixel_colours(self, seen: Buffers, owner: np.ndarray) -> np.ndarray:
+    def _pixel_colours(self, seen: Buffers) -> np.ndarray:
         if self.scalar:
             return colours.mapped(seen.value, self.low, self.high, self.map)
-        picture = np.zeros((*seen.surfel.shape, 3))
-        picture[seen.hit] = self.colour(owner[seen.surfel[seen.hit]])
+        picture = np.zeros((*seen.owner.shape, 3))
+        picture[seen.hit] = self.colour(seen.owner[seen.hit])
         return picture
 
     def picture(self, frame: Frame) -> np.ndarray:
         """The picture alone (rows x columns x 3, 0 to 1)."""
-        seen, surface, owner = self.buffers(frame)
+        seen, position = self._seen(frame)
         camera, spacing = self.camera, self.run.point_spacing
-        radius = REACH * spacing
-        shadows = shading.Shadows(camera.turn(surface.position - camera.target), camera.turn(surface.normal),
-                                  radius)
-        line = shading.silhouettes(seen, owner, 0.9 * radius)
-        picture = shading.shade(seen, camera, self._pixel_colours(seen, owner), surface.cut, shadows, line, radius,
-                                6 * spacing, exact=self.scalar is not None)
+        for plane in self.look.planes:
+            position = position[plane.above(position) < 0]
+        shadows = shading.Shadows(camera.turn(position - camera.target), spacing)
+        line = shading.silhouettes(seen, spacing)
+        picture = shading.shade(seen, camera, self._pixel_colours(seen), shadows, line, spacing, exact=self.scalar is not None)
         return box_lines(picture, camera, seen.depth, self.box)
 
     def sheet(self, frame: Frame, title: str) -> Sheet:
@@ -166,9 +178,10 @@ class Scene:
         seen = paint_balls(ball, size, camera)
         colour = np.where(net.strong[kept][:, None], STRONG, WEAK)[line] if len(line) else np.zeros((1, 3))
         light = 0.5 + 0.5 * np.clip(seen.normal @ shading.LIGHT, 0, 1)
-        rods = colour[seen.surfel] * light[..., None]
+        rods = colour[seen.owner] * light[..., None]
         picture[seen.hit] = rods[seen.hit]
-        edge = shading.silhouettes(seen, line, 2 * most) if len(line) else np.zeros(seen.hit.shape)
+        seen.owner[seen.hit] = line[seen.owner[seen.hit]]
+        edge = shading.silhouettes(seen, 2 * most)
         sheet = Sheet(shading.soften(picture * (1 - 0.35 * edge)[..., None], edge), title, self.run.failed)
         sheet.scale_bar(camera, look.perspective)
         sheet.axes(camera)

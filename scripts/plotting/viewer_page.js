@@ -95,7 +95,7 @@ function showHistory() {
   pen.textAlign = "right";
   for (const v of [low, (low + high) / 2, high]) pen.fillText(text(v), 84, y(v) + 7);
   pen.textAlign = "center";
-  for (const t of [0, end / 2, end]) pen.fillText(text(t), Math.min(x(t), w - 36), h - 26);
+  for (const t of [0, end / 2, end]) pen.fillText(text(t), Math.min(x(t), w - pen.measureText(text(t)).width / 2 - 2), h - 26);
   pen.fillText("time [s]", 90 + (w - 110) / 2, h - 4);
   pen.strokeStyle = "#1b6ca8";
   pen.lineWidth = 3;

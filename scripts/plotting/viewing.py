@@ -23,7 +23,8 @@ from figures import label
 from results import Frame, MissingData, Run
 from scalars import SCALARS, limits, mean_pressure, mises, scalar
 from space import up_axis
-from surface import depths, lattice_of
+from skin import depths
+from surface import lattice_of
 
 HERE = Path(__file__).resolve().parent
 SIZE = 5.9e6  # bytes of a page, unless asked for otherwise

@@ -1,15 +1,25 @@
 #include "cairn/body/loops.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace cairn {
+namespace {
+
+/// 0 where all edges lie at one height, so that all of them are in the first band.
+double bands_per_length(std::size_t bands, const auto& bounds) {
+  const double scale = static_cast<double>(bands) / (bounds.upper.y() - bounds.lower.y());
+  return std::isfinite(scale) ? scale : 0;
+}
+
+}  // namespace
 
 Loops::Loops(const std::vector<std::vector<Vec3>>& lines) : bounds_(shapes::nothing()) {
   for (const auto& line : lines) add_edges(shapes::without_repeated(line), edges_);
   for (const auto& edge : edges_) shapes::widen(bounds_, edge.from);
   if (edges_.empty()) return;
   bands_.resize(std::clamp<std::size_t>(edges_.size(), 1, 4096));
-  const double low = bounds_.lower.y(), scale = static_cast<double>(bands_.size()) / (bounds_.upper.y() - low);
+  const double low = bounds_.lower.y(), scale = bands_per_length(bands_.size(), bounds_);
   const auto at = [&](double y) { return std::clamp<double>((y - low) * scale, 0, double(bands_.size() - 1)); };
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const auto [first, last] = std::minmax({at(edges_[e].from.y()), at(edges_[e].to.y())});
@@ -21,7 +31,7 @@ Loops::Loops(const std::vector<std::vector<Vec3>>& lines) : bounds_(shapes::noth
 }
 
 const std::vector<std::int32_t>& Loops::band(double y) const {
-  const double low = bounds_.lower.y(), scale = static_cast<double>(bands_.size()) / (bounds_.upper.y() - low);
+  const double low = bounds_.lower.y(), scale = bands_per_length(bands_.size(), bounds_);
   return bands_[static_cast<std::size_t>(std::clamp<double>((y - low) * scale, 0, double(bands_.size() - 1)))];
 }
 

@@ -123,6 +123,22 @@ def test_ellipsoid(cairn: Program, scratch: Path) -> None:
     expect(sum(map(int, kinds[2::3])) == len(text[2].split()), f"{kinds} and {text[2]}")
     said = export(scratch / "run", "--form", "vtp").stdout
     expect("no vtp" in said, said)
+    as_others_read(scratch / "run" / "export", frames)
+
+
+def as_others_read(folder: Path, frames: list) -> None:
+    """ASE finds the same bodies in grains.dump and grains.xyz."""
+    try:
+        from ase.io import read
+    except ImportError:
+        return print("ASE: skipped, it is not there")
+    for name, options in (("grains.dump", {"format": "lammps-dump-text"}), ("grains.xyz", {"format": "extxyz"})):
+        found = read(folder / name, index=":", **options)
+        expect(len(found) == len(frames), f"{name}: ASE sees {len(found)} frames")
+        for atoms, (_, rows) in zip(found, frames):
+            place = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
+            expect(np.abs(atoms.positions - place).max() < 1e-5, f"{name}: ASE sees {atoms.positions}")
+            expect(atoms.pbc.tolist() == [True, False, False], f"{name}: ASE sees periods {atoms.pbc}")
 
 
 def test_contacts(cairn: Program, scratch: Path) -> None:

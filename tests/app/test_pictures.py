@@ -69,11 +69,11 @@ def write_spheres(folder: Path, side: int, periodic: str = "false") -> results.R
 def seen(run: results.Run, **look):
     """The camera, what it sees, and where that is in space [m]."""
     scene = Scene(run, Look(**look), run.frames)
-    buffers, surface, owner = scene.buffers(run.frames[0])
+    buffers = scene.buffers(run.frames[0])
     row, column = np.nonzero(buffers.hit)
     camera = scene.camera
     turned = camera.unproject(column + 0.5, row + 0.5, buffers.depth[buffers.hit])
-    return scene, buffers, turned @ camera.basis + camera.target, owner[buffers.surfel[buffers.hit]]
+    return scene, buffers, turned @ camera.basis + camera.target, buffers.owner[buffers.hit]
 
 
 def test_surface(cairn: Program, scratch: Path) -> None:
@@ -84,13 +84,24 @@ def test_surface(cairn: Program, scratch: Path) -> None:
         away = place - 0.5
         distance = np.linalg.norm(away, axis=1)
         off = np.abs(distance - 0.5) / SPACING
-        expect(np.percentile(off, 95) < 0.4, f"{look}: the surface is off by {np.percentile(off, 95):.2f} spacings")
+        expect(np.percentile(off, 95) < 0.25, f"{look}: the surface is off by {np.percentile(off, 95):.2f} spacings")
         normal = buffers.normal[buffers.hit] @ scene.camera.basis
         angle = np.degrees(np.arccos(np.clip((normal * away).sum(axis=1) / distance, -1, 1)))
-        expect(np.percentile(angle, 90) < 9, f"{look}: normals are off by {np.percentile(angle, 90):.1f} degrees")
+        expect(np.percentile(angle, 90) < 6, f"{look}: normals are off by {np.percentile(angle, 90):.1f} degrees")
         if not look.get("perspective"):
             area = buffers.hit.sum() / scene.camera.scale**2 / (np.pi / 4)
-            expect(abs(area - 1) < 0.05, f"{look}: the outline's area is {area:.3f} of a disk's")
+            expect(abs(area - 1) < 0.03, f"{look}: the outline's area is {area:.3f} of a disk's")
+            rough = ragged(buffers.hit) / scene.camera.scale / SPACING
+            expect(rough < 0.1, f"{look}: the outline's radius varies by {rough:.3f} spacings")
+
+
+def ragged(hit: np.ndarray) -> float:
+    """Standard deviation of an outline's distance from its middle, of what a pixel more or less does not make [pixels]."""
+    rim = hit[1:-1, 1:-1] & ~(hit[:-2, 1:-1] & hit[2:, 1:-1] & hit[1:-1, :-2] & hit[1:-1, 2:])
+    place = np.argwhere(rim) - np.argwhere(hit[1:-1, 1:-1]).mean(axis=0)
+    radius, angle = np.linalg.norm(place, axis=1), np.arctan2(place[:, 0], place[:, 1])
+    sector = ((angle / np.pi + 1) * 90).astype(int) % 180  # two degrees each
+    return float((np.bincount(sector, radius) / np.maximum(np.bincount(sector), 1)).std())
 
 
 def test_cut(cairn: Program, scratch: Path) -> None:
@@ -152,8 +163,6 @@ def test_periodic_lattice(cairn: Program, scratch: Path) -> None:
     value = lattice.to_points(lattice.to_nodes(x[:, 1] * volume) / total)
     middle = inner & (np.abs(x[:, 1] - 0.5) < 0.3)
     expect(np.abs(value - x[:, 1])[middle].max() < 1e-12, "a linear field is not kept")
-    slope = lattice.gradient(lattice.to_nodes(x[:, 1] * volume) / total)[middle]
-    expect(np.allclose(slope, (0, 1)), f"gradient {slope[0]}")
 
 
 def test_camera(cairn: Program, scratch: Path) -> None:
