@@ -41,7 +41,8 @@ Vec3 neo_hookean(const Vec3& stretch) {
     Tensor<Dim, double> F{};
     for (int i = 0; i < Dim; ++i) F.c[tensor_index<Dim>(i, i)] = s[i];
     if constexpr (Dim == 2) F.c[4] = 1;  // zz
-    return std::visit([&](const auto& l) { return l.strain_energy(F, nullptr); }, law);
+    const std::array<double, state_capacity> state{};
+    return std::visit([&](const auto& l) { return l.strain_energy(F, state.data()); }, law);
   };
   Vec3 stress = Vec3::Zero();
   for (int i = 0; i < Dim; ++i) {
