@@ -65,6 +65,20 @@ void average_along_rims(const Lattice<3>& lattice, double reach, std::vector<Cra
   }
 }
 
+/// What a patch knows of the steps so far.
+template <int Dim>
+struct Remembered {
+  PatchLedger ledger;
+  double pressing;
+  std::map<int, ToolSum> tools;
+
+  explicit Remembered(Patch<Dim>& patch)
+      : ledger(patch.ledger), pressing(patch.pressing), tools(std::move(patch.tools)) {}
+  void give_back(Patch<Dim>& patch) {
+    patch.ledger = ledger, patch.pressing = pressing, patch.tools = std::move(tools);
+  }
+};
+
 }  // namespace
 
 template <int Dim>
@@ -119,11 +133,10 @@ std::vector<CrackTip<Dim>> Simulation<Dim>::find_tips() const {
 template <int Dim>
 double Simulation<Dim>::find_motion() {
   ContactSettings<Dim> contact = contact_;
-  contact.keep_contacts = false;
+  contact.keep_contacts = contact.keep_tools = false;
   // Before the first step: that of a wave.
   const double dt = dt_ > 0 ? dt_ : limits_.cfl * lattice_.smallest_spacing() / maxima_[0];
-  std::vector<PatchLedger> ledgers;
-  for (const auto& patch : patches_) ledgers.push_back(patch.ledger);
+  std::vector<Remembered<Dim>> remembered(patches_.begin(), patches_.end());
   exchange_->begin_sums(transfer_.extras);
   exchange_after([&](std::size_t p, Patch<Dim>& patch) { project_points(p, patch); });
   for_patches([&](std::size_t p, Patch<Dim>& patch) {
@@ -140,7 +153,7 @@ double Simulation<Dim>::find_motion() {
     for (auto& piece : patch.pieces) integrate(piece, dt), piece.projected = false;
     constrain_motion(patch, lattice_, contact.faces, bodies_, dt, true);
   });
-  for (std::size_t p = 0; p < patches_.size(); ++p) patches_[p].ledger = ledgers[p], row_forces_[p].clear();
+  for (std::size_t p = 0; p < patches_.size(); ++p) remembered[p].give_back(patches_[p]), row_forces_[p].clear();
   return dt;
 }
 

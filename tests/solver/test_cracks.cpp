@@ -134,6 +134,31 @@ TEST(Cracks, ABlockSlidesAlongACrack) {
   check_sliding<2>(c, 0.5, [](const Vec<2>& x) { return x.x() > 1 && x.x() < 1.8; });
 }
 
+/// To look at tips is to go through a part of a step, which nothing must remember.
+TEST(Cracks, LookingAtTipsChangesNothing) {
+  Case c = soft_case(2, 24, 6);
+  add_body(c, BoxShape{Vec3(5.0 / 24, 0, 0), Vec3(19.0 / 24, 1, 0)});
+  add_crack(c, {Vec3(0.4, 0.5031, 0), Vec3(0.6, 0.5031, 0)}, CrackLaw::friction);
+  c.cracks[0].ends = {CrackEnd::tip, CrackEnd::tip};
+  c.faces[2].type = FaceType::wall, c.faces[3].type = FaceType::fixed;
+  c.faces[2].velocity = Vec3(0, 0.1, 0), c.faces[3].velocity = Vec3(0, -0.1, 0);
+  c.output.forces.every = 1;
+  Simulation<2> plain(c, MPI_COMM_SELF), watched(c, MPI_COMM_SELF);
+  for (int i = 0; i < 20; ++i) {
+    plain.step(1e300), watched.step(1e300);
+    ASSERT_EQ(watched.tip_states().size(), 2u);
+  }
+  const auto before = plain.tool_sums(), after = watched.tool_sums();
+  EXPECT_LT(before[2].total[1], 0) << "nothing pressed the wall";
+  for (std::size_t t = 0; t < before.size(); ++t)
+    EXPECT_TRUE(before[t].total == after[t].total && before[t].last == after[t].last) << "tool " << t;
+  for (std::size_t p = 0; p < plain.patches().size(); ++p)
+    EXPECT_EQ(plain.patches()[p].pressing, watched.patches()[p].pressing);
+  EXPECT_EQ(plain.totals().energy(), watched.totals().energy());
+  const auto moved = points_of(watched);
+  for (const auto& [id, a] : points_of(plain)) ASSERT_EQ(a.v, moved.at(id).v) << id;
+}
+
 TEST(Cracks, ACrackAlongPointsIsAnError) {
   Case c = block_at_rest();
   add_crack(c, {Vec3(0.1, 0.5 + 1.0 / 96, 0), Vec3(0.9, 0.5 + 1.0 / 96, 0)}, CrackLaw::friction);

@@ -1,7 +1,10 @@
-"""Cracks: a double cantilever beam drawn apart, at rest and growing, and a plate under a sudden tension."""
+"""Cracks: a double cantilever beam drawn apart, at rest and growing, a plate under a sudden tension, plates at rest, discs
+that are pressed until they split, a round crack in 3D."""
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 
 import h5py
@@ -10,6 +13,7 @@ import numpy as np
 from validation.checks import Check, below, near
 from validation.closed_forms import plane_strain_modulus
 from validation.figures import Curve, Panel, draw_panels
+from validation.problems import brazilian, cracks_at_rest
 from validation.runs import Run
 from validation.series import history, read_table
 from validation.suite import Folders, Problem
@@ -20,14 +24,38 @@ MODULUS = plane_strain_modulus(70e9, 0.22)
 TOUGHNESS = 60.0  # J_c [J/m2]
 PERIOD = 2 * np.pi / 3.516 * (TIP - LOAD) ** 2 / np.sqrt(MODULUS * ARM**2 / 12 / 2500)  # of an arm [s]
 CHEN = 400e6 * np.sqrt(np.pi * 2.4e-3)
+# Unit tests that print what they measure.
+SUDDEN, PENNY = "half-infinite crack", "penny"
+TESTS = {SUDDEN: "Cracks.StressIntensityOfASuddenlyLoadedCrack", PENNY: "SlowRims.StressIntensityOfAPennyShapedCrack"}
 
 
-def runs(_full: bool) -> dict[str, Run]:
+def runs(full: bool) -> dict[str, Run]:
     slow = {"output.particles": '{ interval = 1e-5, fields = ["velocity"] }'}
     still = {"cracks": '[{ points = [[0.4e-3, 8.05e-3], [13.05e-3, 8.05e-3]], ends = ["open", "tip"], '
                        'law = "frictionless" }]'}
-    return {"beam": Run("dcb", slow | still | {"time.end": 2.5e-4}, 60), "growing beam": Run("dcb", slow, 90),
-            "plate": Run("validation/chen_plate", {}, 20)}
+    found = {"beam": Run("dcb", slow | still | {"time.end": 2.5e-4}, 60), "growing beam": Run("dcb", slow, 90),
+             "plate": Run("validation/chen_plate", {}, 20)}
+    if full:
+        found |= {name: Run(tool=("tests/test_solver", f"--gtest_filter={test}"), cost=60) for name, test in TESTS.items()}
+    return found | cracks_at_rest.runs(full) | brazilian.runs(full)
+
+
+def check_tests(folders: Folders) -> list[Check]:
+    """Freund, Dynamic Fracture Mechanics (1990), section 2.5; Sneddon, Proc. R. Soc. A 187 (1946)."""
+    found = []
+    if SUDDEN in folders:
+        log = (folders[SUDDEN] / "log.txt").read_text(encoding="utf-8")
+        errors = re.findall(r"aside (\S+): K_I off by (\S+)", log) or [("-", "nan")]
+        found += [below(SUDDEN, f"rms error of K_I, {aside} from a grid line, cells of 0.5", float(error), 0.03)
+                  for aside, error in errors]
+    if PENNY in folders:
+        log = (folders[PENNY] / "log.txt").read_text(encoding="utf-8")
+        numbers = re.search(r"penny: K_I (\S+) \((\S+) to (\S+)\)", log)
+        mean, low, high = map(float, numbers.groups()) if numbers else (math.nan,) * 3
+        found += [near(PENNY, "mean of K_I / (2 s sqrt(a/pi))", mean, 1, 0.06),
+                  Check(PENNY, "least along the rim", low, 0.94, 1.06), Check(PENNY, "most", high, 0.94, 1.06),
+                  below(PENNY, "range over the mean", (high - low) / mean, 0.05)]
+    return found
 
 
 def beam(folder: Path) -> dict[str, np.ndarray]:
@@ -77,7 +105,7 @@ def checks(folders: Folders) -> list[Check]:
         K, time = tips["K_I"][right] / CHEN, tips["time"][right]
         found += [Check("plate", "largest K_I/(s sqrt(pi a))", K.max(), 2.65, 2.85),
                   Check("plate", "its time [us]", 1e6 * time[K.argmax()], 6.2, 6.6)]
-    return found
+    return found + check_tests(folders) + cracks_at_rest.checks(folders) + brazilian.checks(folders)
 
 
 def draw(folders: Folders, out: Path) -> list[Path]:
@@ -93,7 +121,9 @@ def draw(folders: Folders, out: Path) -> list[Path]:
         right = tips["end"] == 1
         panels.append(Panel("Chen's plate", "time [us]", "K_I/(s sqrt(pi a))",
                             [Curve("Cairn", 1e6 * tips["time"][right], tips["K_I"][right] / CHEN)]))
+    panels += brazilian.panels(folders)
     return [draw_panels(out / "cracks.png", "Cracks", panels, columns=2)] if panels else []
 
 
-PROBLEM = Problem("cracks", "cracks", "Chen 1975; beam theory", runs, checks, draw)
+PROBLEM = Problem("cracks", "Cracks", "beam theory; Chen 1975; Freund 1990; Sneddon 1946; Feddersen 1966; "
+                  "Gross, Srawley & Brown 1964; Atkinson, Smelser & Sanchez 1982", runs, checks, draw)
