@@ -42,7 +42,7 @@ class TrianglesAround {
       const double from = from_[i],
                    to = normal_[0][i] * node[0] + normal_[1][i] * node[1] + normal_[2][i] * node[2] - offset_[i];
       bool out = ((from > sure) & (to > sure)) | ((from < -sure) & (to < -sure));
-      for (int d = 0; d < 3; ++d) out |= (upper[d] < lower_[d][i]) | (upper_[d][i] < lower[d]);
+      for (int d = 0; d < 3; ++d) out |= int{upper[d] < lower_[d][i]} | int{upper_[d][i] < lower[d]};
       kept_[i] = out ? 0 : 1;
     }
     found_.clear();

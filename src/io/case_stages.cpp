@@ -47,7 +47,7 @@ bool fits(std::string_view path, std::string_view pattern) {
 /// Puts what a stage sets into the case before it; reports keys that cannot change.
 class Changes {
  public:
-  Changes(Table& stage, toml::table& tree) : stage_(stage), tree_(tree) {}
+  explicit Changes(Table& stage) : stage_(stage) {}
 
   void put(const toml::table& set, toml::node& into, const std::string& path) {
     for (const auto& [key, value] : set) {
@@ -89,7 +89,6 @@ class Changes {
     stage_.error("set", fmt::format("{} cannot change in a run; what can is {}", at, listed(changing_keys)));
   }
   Table& stage_;
-  toml::table& tree_;
 };
 
 /// Names of what feels a force; of walls and fixed faces those of the case; and a domain that deforms.
@@ -205,7 +204,7 @@ void read_stages(const toml::table& tree, Table& root, Draft& draft, Errors& err
       table.missing("until", "is missing; only the last stage can go on to the end of the run");
     if (Table set = table.table("set"); set.present()) {
       const toml::table& values = *table.find("set")->as_table();
-      Changes(table, changed).put(values, changed, "");
+      Changes(table).put(values, changed, "");
       stage.set = inline_text(values);
     }
     table.finish();

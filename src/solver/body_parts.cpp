@@ -80,7 +80,7 @@ PieceParts<Dim>::PieceParts(const Piece<Dim>& piece, const Lattice<Dim>& lattice
 
 template <int Dim>
 int& PieceParts<Dim>::row(const Index<Dim>& place, SideSet sides) {
-  if (sides == SideSet()) return base_[box_.offset(place)];
+  if (sides.empty()) return base_[box_.offset(place)];
   return further_.try_emplace({place, sides.key()}, -1).first->second;
 }
 

@@ -74,8 +74,8 @@ std::vector<PatchId> Simulation<Dim>::patches_of_cracks(const Case& c) const {
   std::vector<PatchId> patches;
   for_crack_points(c, [&](const CrackPoint<Dim>&, PatchId patch) { patches.push_back(patch); });
   std::ranges::sort(patches);
-  const auto rest = std::ranges::unique(patches);
-  patches.erase(rest.begin(), rest.end());
+  // std::ranges::unique does not compile with Clang 14 and the library of GCC 12.
+  patches.erase(std::unique(patches.begin(), patches.end()), patches.end());
   return patches;
 }
 

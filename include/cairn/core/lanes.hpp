@@ -70,7 +70,7 @@ inline double absolute(double a) { return std::abs(a); }
 inline Lanes inverse_cube_root(Lanes a) {
   const Lanes bits = __builtin_convertvector(std::bit_cast<LaneInts>(a), Lanes);
   const double origin = 4.0 / 3.0 * 1022.955 * 4503599627370496.0;
-  Lanes y = std::bit_cast<Lanes>(__builtin_convertvector(origin - bits * (1.0 / 3.0), LaneInts));
+  auto y = std::bit_cast<Lanes>(__builtin_convertvector(origin - bits * (1.0 / 3.0), LaneInts));
   for (int i = 0; i < 5; ++i) y = y * (4.0 - a * (y * y * y)) * (1.0 / 3.0);
   return y;
 }

@@ -39,7 +39,7 @@ struct Problem {
 
 /// Coordinates of `x` in the frame of a shape centred at `c` and turned by `angle` about z.
 inline Vec3 local(const Vec3& x, const Vec3& c, double angle) {
-  const Vec3 d = x - c;
+  Vec3 d = x - c;
   if (angle == 0) return d;
   const double cs = std::cos(angle), sn = std::sin(angle);
   return {cs * d.x() + sn * d.y(), cs * d.y() - sn * d.x(), d.z()};
