@@ -204,6 +204,7 @@ void Simulation<Dim>::restore(const Checkpoint& from) {
   restore_cracks(from.state().cracks);
   restore_parts(from.state().parts, from.state().spared);
   from.fill(patches_, lattice_, bodies_, materials_, cracks_);
+  check_bonds();
   connect_patches();
   receive_cracks();
   const StepState& state = from.state().step;

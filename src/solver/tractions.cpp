@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "cairn/core/error.hpp"
+#include "cairn/io/agreement.hpp"
 #include "cairn/io/first_step.hpp"
 #include "cairn/parallel/crack_exchange.hpp"
 #include "cairn/solver/simulation.hpp"
@@ -96,6 +98,19 @@ struct Opening {
   }
 };
 
+/// \throws InputError on every rank where faces are bound though their crack has no law that binds them
+template <int Dim>
+void Simulation<Dim>::check_bonds() const {
+  std::string error;
+  for (const auto& patch : patches_)
+    for (const auto& point : patch.cracks)
+      if (point.bond.state != Bond::none && (traction_laws_.empty() || !traction_laws_[point.crack]))
+        error = fmt::format("the checkpoint binds the faces at point {} of crack {}, which has no such law",
+                            point.index, point.crack);
+  error = common_error(comm_, error);
+  if (!error.empty()) throw InputError(error);
+}
+
 /// Crack points learn of their faces' new places: their history, and what they pull with in the next step.
 template <int Dim>
 void Simulation<Dim>::follow_openings() {
@@ -155,6 +170,7 @@ void Simulation<Dim>::exchange_tractions() {
 
 #define CAIRN_INSTANTIATE(Dim)                                                               \
   template void Simulation<Dim>::define_tractions(const Case&);                              \
+  template void Simulation<Dim>::check_bonds() const;                                        \
   template void Simulation<Dim>::bind_faces(const Case&);                                    \
   template void Simulation<Dim>::follow_openings();                                          \
   template std::array<double, 2> Simulation<Dim>::energies_of(const CrackPoint<Dim>&) const; \

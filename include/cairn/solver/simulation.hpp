@@ -272,6 +272,7 @@ class Simulation {
   void check_points_on_cracks(const Case& c);
   // solver/tractions.cpp
   void define_tractions(const Case& c);
+  void check_bonds() const;  // after they were read
   void bind_faces(const Case& c);
   void find_tractions(std::size_t p);
   // solver/split.cpp
