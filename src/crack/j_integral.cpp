@@ -129,22 +129,30 @@ TipSums tip_terms(const CrackTip<Dim>& tip, const TipPoint<Dim>& point, double i
   return sums;
 }
 
+double face_weight(double inner, double outer) {
+  constexpr int intervals = 64;  // in the root of r, in which the integrand is smooth
+  const double step = std::sqrt(outer) / intervals;
+  double sum = 0;
+  for (int i = 0; i < intervals; ++i) {
+    const double root = (i + 0.5) * step;
+    sum += radial_weight(Vec<2>(root * root, 0), inner, outer).q;
+  }
+  return 2 * step * sum / std::sqrt(2 * M_PI);
+}
+
 template <int Dim>
-TipSums face_terms(const CrackTip<Dim>& tip, const Vec<Dim>& x, const Vec<Dim>& force, double width, double inner,
-                   double outer) {
+TipSums face_terms(const CrackTip<Dim>& tip, const Vec<Dim>& x, const Vec<Dim>& force, double h, double weight) {
+  constexpr double from = 1.25, length = 3;  // of the window [cells]: its nodes see nothing of what is ahead of the tip
   TipSums sums;
   const auto axes = axes_of(tip);
-  const Vec<Dim> away = x - tip.position, normal = axes.row(1).transpose();
-  const double behind = -away.dot(tip.ahead);
-  const double from = std::max(0.0, behind - 0.5 * width), to = behind + 0.5 * width;
-  if (!(to > 0) || tip.modulus == 0 || std::abs(away.dot(normal)) > outer) return sums;
-  Vec<Dim> there = Vec<Dim>::Unit(0) * behind;  // beside the node, in the plane of the crack
-  if constexpr (Dim == 3) there[2] = axes.row(2).dot(away);
-  const double q = weight_at<Dim>(there, tip.hat, inner, outer).q;
-  // The mean of 1/sqrt(2 pi r) over the width.
-  const double unit = q * 4 / tip.modulus * 2 * (std::sqrt(to) - std::sqrt(from)) / (width * std::sqrt(2 * M_PI));
-  sums.I_opening = unit * force.dot(normal), sums.I_sliding = unit * force.dot(tip.ahead);
-  if constexpr (Dim == 3) sums.I_tearing = unit * tip.modulus / (2 * tip.shear_modulus) * axes.row(2).dot(force);
+  const Vec<Dim> away = axes * (x - tip.position) / h;
+  const double in_window = (-away[0] - from) / length;
+  if (!(in_window > 0 && in_window < 1) || tip.modulus == 0 || std::abs(away[1]) > from + length) return sums;
+  double unit = 2 * std::pow(std::sin(M_PI * in_window), 2) / (length * h) * weight * 4 / tip.modulus;
+  if constexpr (Dim == 3) unit *= std::max(0.0, 1 - std::abs(away[2]) * h / tip.hat);
+  const Vec<Dim> turned = unit * (axes * force);
+  sums.I_opening = turned[1], sums.I_sliding = turned[0];
+  if constexpr (Dim == 3) sums.I_tearing = tip.modulus / (2 * tip.shear_modulus) * turned[2];
   return sums;
 }
 
@@ -158,9 +166,9 @@ HoopStress largest_hoop_stress(double K_opening, double K_sliding) {
   return {angle, c * (K_opening * c * c - 1.5 * K_sliding * std::sin(angle))};
 }
 
-#define CAIRN_INSTANTIATE(Dim)                                                                                 \
-  template double tip_weight(const CrackTip<Dim>&, const Vec<Dim>&, double, double);                           \
-  template TipSums face_terms(const CrackTip<Dim>&, const Vec<Dim>&, const Vec<Dim>&, double, double, double); \
+#define CAIRN_INSTANTIATE(Dim)                                                                         \
+  template double tip_weight(const CrackTip<Dim>&, const Vec<Dim>&, double, double);                   \
+  template TipSums face_terms(const CrackTip<Dim>&, const Vec<Dim>&, const Vec<Dim>&, double, double); \
   template TipSums tip_terms(const CrackTip<Dim>&, const TipPoint<Dim>&, double, double);
 CAIRN_INSTANTIATE(2)
 CAIRN_INSTANTIATE(3)

@@ -161,7 +161,7 @@ double Simulation<Dim>::find_motion() {
 template <int Dim>
 void Simulation<Dim>::add_face_terms(std::size_t p, const std::vector<CrackTip<Dim>>& tips, double dt,
                                      std::vector<TipSums>& sums) const {
-  const double h = lattice_.smallest_spacing();
+  const double h = lattice_.smallest_spacing(), weight = face_weight(j_radius_[0] * h, j_radius_[1] * h);
   sweeps_[p].for_forces_across(dt, [&](const Index<Dim>& place, int crack, const Vec<Dim>& force) {
     Vec<Dim> x;
     for (int d = 0; d < Dim; ++d) x[d] = lattice_.node_position(d, place[d]);
@@ -170,7 +170,7 @@ void Simulation<Dim>::add_face_terms(std::size_t p, const std::vector<CrackTip<D
       const Vec<Dim> near = beside(lattice_, x, tips[t].position);
       // In 2D above is left of the crack's direction, and of the tip's at its last end alone.
       const Vec<Dim> on_left = Dim == 3 || tips[t].end == 1 ? force : Vec<Dim>(-force);
-      const TipSums add = face_terms(tips[t], near, on_left, h, j_radius_[0] * h, j_radius_[1] * h);
+      const TipSums add = face_terms(tips[t], near, on_left, h, weight);
       sums[t].I_opening += add.I_opening, sums[t].I_sliding += add.I_sliding, sums[t].I_tearing += add.I_tearing;
     }
   });

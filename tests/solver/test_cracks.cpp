@@ -134,6 +134,27 @@ TEST(Cracks, ABlockSlidesAlongACrack) {
   check_sliding<2>(c, 0.5, [](const Vec<2>& x) { return x.x() > 1 && x.x() < 1.8; });
 }
 
+/// Under pressure from all sides a crack that nothing rubs is as if it were not there, however it lies on the grid.
+TEST(Cracks, APressedCrackHasNoStressIntensity) {
+  const double pressure = 1, half = 0.25;
+  for (const double angle : {0.0, 0.35, M_PI / 4, 1.2, 2.5}) {
+    Case c = soft_case(2, 24, 6);
+    add_body(c, BoxShape{Vec3(0, 0, 0), Vec3(1, 1, 0)});
+    c.bodies[0].initial_pressure = pressure;
+    for (int face = 0; face < 4; ++face) c.faces[face].type = FaceType::symmetry;
+    const Vec3 centre(0.511, 0.487, 0), along(half * std::cos(angle), half * std::sin(angle), 0);
+    add_crack(c, {centre - along, centre + along}, CrackLaw::friction, 0);
+    c.cracks[0].ends = {CrackEnd::tip, CrackEnd::tip};
+    Simulation<2> simulation(c, MPI_COMM_SELF);
+    for (int i = 0; i < 3; ++i) simulation.step(1e300);
+    const double open = pressure * std::sqrt(M_PI * half);
+    for (const auto& tip : simulation.tip_states()) {
+      EXPECT_NEAR(tip.K_opening, 0, 0.1 * open) << angle << ' ' << tip.tip.end;
+      EXPECT_NEAR(tip.K_sliding, 0, 0.1 * open) << angle << ' ' << tip.tip.end;
+    }
+  }
+}
+
 /// To look at tips is to go through a part of a step, which nothing must remember.
 TEST(Cracks, LookingAtTipsChangesNothing) {
   Case c = soft_case(2, 24, 6);

@@ -139,6 +139,27 @@ TEST(SlowCracks3D, ABlockSlidesAlongACrack) {
   check_sliding<3>(c, 0.3, [](const Vec<3>& x) { return x.x() > 0.6 && x.x() < 1.4 && std::abs(x.z() - 0.35) < 0.15; });
 }
 
+/// As in 2D: under pressure from all sides.
+TEST(Cracks3D, APressedCrackHasNoStressIntensity) {
+  const double pressure = 1, radius = 0.27;
+  for (const Vec3& normal : {Vec3(0, 0, 1), Vec3(0.3, 0.5, 0.8), Vec3(1, 1, 0)}) {
+    Case c = soft_case(3, 18, 6);
+    add_body(c, BoxShape{Vec3(0, 0, 0), Vec3(1, 1, 1)});
+    c.bodies[0].initial_pressure = pressure;
+    for (auto& face : c.faces) face.type = FaceType::symmetry;
+    add_disk(c, Vec3(0.511, 0.487, 0.493), normal, radius, CrackLaw::friction);
+    c.cracks[0].friction = 0;
+    Simulation<3> simulation(c, MPI_COMM_SELF);
+    simulation.step(1e300);
+    const double open = 2 * pressure * std::sqrt(radius / M_PI);
+    const auto rim = simulation.tip_states();
+    ASSERT_GT(rim.size(), 10u);
+    for (const auto& tip : rim)
+      for (const double K : {tip.K_opening, tip.K_sliding, tip.K_tearing})
+        EXPECT_NEAR(K, 0, 0.1 * open) << normal.transpose() << ": " << tip.tip.end;
+  }
+}
+
 TEST(Cracks3D, ACrackAlongPointsIsAnError) {
   Case c = block_at_rest_3d();
   add_disk(c, Vec3(0.5, 0.5 + 1.0 / 48, 0.5), Vec3(0, 1, 0), 0.3, CrackLaw::friction);

@@ -52,12 +52,16 @@ struct TipSums {
 template <int Dim>
 double tip_weight(const CrackTip<Dim>& tip, const Vec<Dim>& x, double inner, double outer);
 
-/// What a force on the upper face [N] adds, and its opposite on the lower one, within half of `width` [m] of x: with
-/// t on the upper face, I_m + int q (t . e_m) 4/(E' sqrt(2 pi r)) ds, e the normal for opening, ahead for sliding; in
-/// 3D for tearing 1/mu in the place of 1/E', and e the third axis.
+/// int q/sqrt(2 pi r) dr along a face, by which a traction on both faces that is the same all along counts [m^(1/2)].
+double face_weight(double inner, double outer);
+
+/// What a force on the upper face [N] at x, and its opposite on the lower one, adds. With a traction t on the upper
+/// face, I_m + int q (t . e_m) 4/(E' sqrt(2 pi r)) ds, e the normal for opening, ahead for sliding; in 3D for tearing
+/// 1/mu in the place of 1/E', and e the third axis. Nodes near the tip pass on the stress of what is ahead of it as
+/// well, so t is the mean of forces from 1.25 to 4.25 cells behind the tip, by a smooth window. \param h  [m]  \param
+/// weight  face_weight
 template <int Dim>
-TipSums face_terms(const CrackTip<Dim>& tip, const Vec<Dim>& x, const Vec<Dim>& force, double width, double inner,
-                   double outer);
+TipSums face_terms(const CrackTip<Dim>& tip, const Vec<Dim>& x, const Vec<Dim>& force, double h, double weight);
 
 /// The direction of the largest hoop stress [rad] from the one ahead, and the stress intensity there (Erdogan & Sih, J.
 /// Basic Eng. 85, 1963).
