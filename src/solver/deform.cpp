@@ -82,7 +82,9 @@ std::array<double, 6> stress_of_points(const Piece<Dim>& piece, double density) 
 
 template <int Dim>
 void Simulation<Dim>::deform() {
-  if (deformation_.active()) deform_by(dt_ * strain_rates());
+  if (!deformation_.active()) return;
+  rates_ = strain_rates();
+  deform_by(dt_ * rates_);
 }
 
 template <int Dim>

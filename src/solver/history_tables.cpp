@@ -29,6 +29,7 @@ std::vector<std::string> history_columns(int dimension) {
   if (dimension == 3) names.emplace_back("length_z");
   names.insert(names.end(), {"stress_xx", "stress_yy", "stress_zz", "stress_xy"});
   if (dimension == 3) names.insert(names.end(), {"stress_yz", "stress_xz"});
+  names.insert(names.end(), {"shear_rate", "inertial_number"});
   return names;
 }
 
@@ -98,6 +99,8 @@ void HistoryTables<Dim>::add(const Simulation<Dim>& simulation, const Totals& t,
                          simulation.force_balance().largest()});
   for (int d = 0; d < Dim; ++d) row.emplace_back(simulation.face_distance(2 * d));
   row.insert(row.end(), t.stress.begin(), t.stress.begin() + symmetric_size<Dim>);
+  row.insert(row.end(),
+             {shear_rate(t.velocity_gradient, Dim), inertial_number(t, simulation.force_balance().bodies, Dim)});
   history_.add_row(row);  // nothing where the file is not open: on other ranks
   if (!track_.empty()) add_bodies(simulation);
 }

@@ -75,7 +75,8 @@ std::vector<Tool> make_tools(const Case& c, std::vector<Body>& bodies) {
   for (std::size_t b = 0; b < bodies.size(); ++b) {
     if (!bodies[b].rigid || bodies[b].tool >= 0) continue;
     bodies[b].tool = static_cast<std::int32_t>(tools.size());
-    tools.push_back({fmt::format("body{}", b), bodies[b].centre, bodies[b].velocity, bodies[b].angular_velocity, {}, {}});
+    tools.push_back(
+        {fmt::format("body{}", b), bodies[b].centre, bodies[b].velocity, bodies[b].angular_velocity, {}, {}});
   }
   for (Tool& tool : tools) tool.now = tool.next = tool.velocity.at(0), tool.spin_now = tool.spin_next = tool.spin.at(0);
   return tools;

@@ -98,6 +98,15 @@ TEST(Deform, AFilledDomainHasTheStressOfItsStrain2D) {
 }
 TEST(Deform, AFilledDomainHasTheStressOfItsStrain3D) { check_filled<3>(StressUpdate::both); }
 
+/// Nothing moves but the domain: the mean flow of its bodies is its own.
+TEST(Deform, TheMeanFlowIsThatOfTheDomain) {
+  Case c = filled_case<2>(8);
+  c.domain.deformation.axes[0] = {By::strain_rate, MotionTable(Vec3(-0.3, 0, 0))};
+  Simulation<2> simulation(c, MPI_COMM_WORLD);
+  for (int i = 0; i < 3; ++i) simulation.step(forever);
+  EXPECT_NEAR(simulation.totals().velocity_gradient(0, 0), -0.3, 1e-9);
+}
+
 TEST(Deform, ABodyThatFliesSlowsAsItsWayStretches) {
   Case c = periodic_case<2>(16);
   add_body(c, Ball{Vec3(0.1, 0.6, 0), 0.2}, Vec3(0.7, 0.3, 0));

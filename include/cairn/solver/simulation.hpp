@@ -355,7 +355,8 @@ class Simulation {
   MotionTable gravity_;
   DampingOptions damping_;
   Deformation deformation_;
-  Vec3 needed_rates_ = Vec3::Zero();  // StepState::needed_rates
+  Vec3 needed_rates_ = Vec3::Zero();   // StepState::needed_rates
+  Vec<Dim> rates_ = Vec<Dim>::Zero();  // at which the domain deformed in the last step
   bool keep_balance_ = false;
   ForceBalance balance_;
   std::array<double, 2> kinetic_{};  // StepState::kinetic, the latest first

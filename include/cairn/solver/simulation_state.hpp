@@ -26,12 +26,23 @@ struct Totals : PatchLedger {
   double numerical = 0;                                        // [J], lost by blending with PIC and in spins
   Vec3 momentum = Vec3::Zero();                                // [kg m/s]; rigid bodies are left out
   double mass = 0, deformable_mass = 0;                        // [kg]
+  double deformable_volume = 0;                                // [m3], as it is now
   std::array<double, 6> stress{};                              // stress_of_points over the room between the faces [Pa]
+  Eigen::Matrix3d velocity_gradient =
+      Eigen::Matrix3d::Zero();  // L of v = v_0 + L x, fitted to deformable points by mass
   double energy() const {
     return kinetic + strain + potential + plastic + viscous + crack_energy + crack_dissipation + contact_dissipation +
            numerical + filtered + damped + energy_left - boundary_work;
   }
 };
+
+/// sqrt(2 D':D'), D' the deviator of the symmetric part; of simple shear its rate [1/s].
+double shear_rate(const Eigen::Matrix3d& velocity_gradient, int dimension);
+
+/// I = shear rate x d sqrt(rho/p) (GDR MiDi, Eur. Phys. J. E 14, 2004; da Cruz et al., Phys. Rev. E 72, 021309), with d
+/// the diameter of a disk or ball of the bodies' mean volume, rho their density, p = -tr sigma / dimension; 0 where p
+/// is not positive or no body is known to be there.
+double inertial_number(const Totals& totals, std::int64_t bodies, int dimension);
 
 /// Where the stepping stands: with the points, all that the next step depends on.
 struct StepState {
