@@ -51,7 +51,7 @@ class Changes {
 
   void put(const toml::table& set, toml::node& into, const std::string& path) {
     for (const auto& [key, value] : set) {
-      const std::string name(key.str()), at = path.empty() ? name : path + "." + name;
+      const std::string name(key.str()), at = path.empty() ? name : fmt::format("{}.{}", path, name);
       const bool known =
           at != "output.track" && std::ranges::any_of(changing_keys, [&](std::string_view k) { return fits(at, k); });
       toml::node* target = part_of(into, name);

@@ -5,10 +5,12 @@
 #include <metis.h>
 
 #include <array>
+#include <cstdlib>
 #include <cstring>
 #include <string_view>
 #include <vector>
 
+#include "cairn/core/printable.hpp"
 #include "cairn_commit.hpp"
 
 namespace cairn {
@@ -88,18 +90,23 @@ const ProgramFacts& program_facts() {
 
 std::string program_disagreement(MPI_Comm comm, const ProgramFacts& facts) {
   constexpr std::size_t width = 256;
+  const auto keep = [](std::array<char, width>& place, std::string_view text) {
+    std::memcpy(place.data(), text.data(), std::min(width - 1, text.size()));
+  };
   int ranks = 1, length = 0;
   MPI_Comm_size(comm, &ranks);
   std::array<char, MPI_MAX_PROCESSOR_NAME> host{};
   MPI_Get_processor_name(host.data(), &length);
   struct Rank {
-    std::array<char, width> program, host;
+    std::array<char, width> program, host, level, wanted;
   };
   Rank mine{};
   const std::string program =
       fmt::format("cairn {} {}, {}, {}", facts.version, facts.commit, facts.instruction_set, facts.compiler);
-  std::memcpy(mine.program.data(), program.data(), std::min(width - 1, program.size()));
-  std::memcpy(mine.host.data(), host.data(), std::min(width - 1, static_cast<std::size_t>(length)));
+  keep(mine.program, program);
+  keep(mine.host, std::string_view(host.data(), static_cast<std::size_t>(length)));
+  keep(mine.level, facts.instruction_set);
+  if (const char* wanted = std::getenv("CAIRN_ISA")) keep(mine.wanted, wanted);
   std::vector<Rank> all(static_cast<std::size_t>(ranks));
   MPI_Allgather(&mine, sizeof mine, MPI_BYTE, all.data(), sizeof mine, MPI_BYTE, comm);
   for (const Rank& other : all)
@@ -108,6 +115,11 @@ std::string program_disagreement(MPI_Comm comm, const ProgramFacts& facts) {
           "the ranks run programs that differ, and would not give one result: '{}' on {} (rank 0) and '{}' on {} (rank "
           "{}); give all of them one program, and one CAIRN_ISA where the machines differ",
           all[0].program.data(), all[0].host.data(), other.program.data(), other.host.data(), &other - all.data());
+  for (const Rank& other : all)
+    if (other.wanted[0] != '\0' && other.wanted != other.level)
+      return fmt::format(
+          "CAIRN_ISA={} on {}: this program is built for {} alone; unset it, or build with CAIRN_NATIVE=OFF",
+          printable(other.wanted.data()), other.host.data(), other.level.data());
   return {};
 }
 

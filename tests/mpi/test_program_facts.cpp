@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+
 #include "cairn/io/program_facts.hpp"
 
 namespace cairn {
@@ -27,6 +29,19 @@ TEST(ProgramFacts, EveryRankIsToldWhichTwoDiffer) {
     EXPECT_NE(text.find("(rank 0)"), std::string::npos) << text;
     EXPECT_NE(text.find("(rank " + std::to_string(ranks.size - 1) + ")"), std::string::npos) << text;
   }
+}
+
+/// A program for one instruction set alone cannot take another; also where one rank alone is asked to.
+TEST(ProgramFacts, AnotherInstructionSetIsNotTakenSilently) {
+  const Ranks ranks;
+  const bool here = ranks.rank == ranks.size - 1;
+  if (here) setenv("CAIRN_ISA", "another", 1);
+  const std::string refused = program_disagreement(MPI_COMM_WORLD);
+  if (here) setenv("CAIRN_ISA", program_facts().instruction_set.c_str(), 1);
+  const std::string its_own = program_disagreement(MPI_COMM_WORLD);
+  if (here) unsetenv("CAIRN_ISA");
+  EXPECT_NE(refused.find("CAIRN_ISA=another"), std::string::npos) << refused;
+  EXPECT_EQ(its_own, "");
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ struct ProgramFacts {
 
 const ProgramFacts& program_facts();
 
-/// What keeps the ranks from giving one result: programs of other versions or instruction sets, by machine. Empty where
-/// they agree. The same on every rank. Collective.
+/// What keeps the ranks from giving one result, the one asked for: programs of other versions or instruction sets, by
+/// machine, or of another one than CAIRN_ISA names. Empty where they agree. The same on every rank. Collective.
 std::string program_disagreement(MPI_Comm comm, const ProgramFacts& facts = program_facts());
 
 }  // namespace cairn
