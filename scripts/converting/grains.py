@@ -20,7 +20,7 @@ def read_yade(lines, name):
     if kind not in YADE and not {"x", "y", "z", "r"} <= set(columns):
         raise InputError(f"{name}:1: the format '{kind[:60]}' is not known; known are {', '.join(YADE)}, and others with x, "
                          "y, z and r in their names")
-    grains = read_rows(lines, name, Columns(columns, name), 2)
+    grains = read_rows(lines, name, Columns(columns, name), 2, width=None if columns[-1] == "..." else len(columns))
     for grain in grains:
         grain.clump = "" if grain.clump in ("-1", "") else grain.clump  # -1: stands alone
     return grains, f"Yade text, {kind}"

@@ -86,6 +86,10 @@ class Columns:
                      velocity, "" if self.clump is None else values[self.clump])
 
 
-def read_rows(lines, name, columns, first=1, split=words):
+def read_rows(lines, name, columns, first=1, split=words, width=None):
+    """Of rows with `width` values each, where it is given."""
     rows = [(i, split(line)) for i, line in enumerate(lines[first - 1:], first)]
+    for i, values in rows:
+        if width and values and len(values) != width:
+            raise InputError(f"{name}:{i}: {len(values)} values; the header names {width}")
     return [columns.grain(values, f"{name}:{i}") for i, values in rows if values]

@@ -91,6 +91,7 @@ GOOD = {
 }
 # Content, arguments, and what the message names.
 BAD = {
+    "short_yade.txt": ("#format id_x_y_z_r_matId\n" + rows("{n}", *XYZR), [], "5 values; the header names 6"),
     "unknown_yade.txt": ("#format jointedPM\n" + rows(*XYZR), [], "jointedPM"),
     "no_header.txt": (rows("{n}", *XYZR), [], "--columns"),
     "four_columns.txt": (rows(*XYZR), [], "--columns"),
