@@ -136,6 +136,7 @@ std::string edit_values(hid_t dataset, const std::string& name, Random& random) 
 enum Layout { shorter, longer, flat, deep, none, scalar, chunked, packed, compact, elsewhere, endless, layouts };
 
 std::vector<hsize_t> other_extent(std::vector<hsize_t> extent, Layout layout, Random& random) {
+  if (extent.empty()) extent = {1};  // of one that was made anew without
   if (layout == shorter) extent[0] = extent[0] > 0 ? extent[0] - 1 : 0;
   if (layout == longer) extent[0] += 1 + random.below(3);
   if (layout == flat) extent = {extent[0] * (extent.size() > 1 ? extent[1] : 1)};
