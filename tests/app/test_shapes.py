@@ -117,7 +117,10 @@ def test_outlines(cairn, here):
         expect(abs(found / right - 1) < 2e-3, f"{name}: {found}")
         expect(box == ("[10, 10] to [30, 30]" if name.endswith("svg") else "[0, 0] to [20, 20]"), f"{name}: {box}")
         expect(abs(thin - 5 / 1.875) < 0.3, f"{name}: {thin}")
-    bad = {"open.svg": (make.SVG.replace(" z", ""), ":4: a path is not closed"), "open.dxf": (make.DXF.replace("21\n0\n0\nLWP", "21\n1\n0\nLWP"), "close it"),
+    unseen = '<defs><g><rect width="50" height="50"/></g></defs><clipPath id="a"/><symbol><circle r="99"/></symbol>'
+    (here / "unseen.svg").write_text(make.SVG.replace("<g ", unseen + "<g ", 1))
+    expect(abs(volume(check(cairn, here, 'type = "outline", file = "unseen.svg", unit = "m"', HEAD_2D))[0] - 300) < 0.6, "unseen.svg")
+    bad = {"use.svg": (make.SVG.replace("</g>", '<use href="#a"/></g>'), ":4: <use> is not read"), "open.svg": (make.SVG.replace(" z", ""), ":4: a path is not closed"), "open.dxf": (make.DXF.replace("21\n0\n0\nLWP", "21\n1\n0\nLWP"), "close it"),
            "spline.dxf": (make.DXF.replace("CIRCLE", "SPLINE"), "SPLINE is not read"), "cross.csv": ("0,0\n2,2\n2,0\n0,2\n", "cross or touch"),
            "number.csv": ("x,y\n0,0\n1,q\n1,1\n", ':3: y: "q"'), "cut.svg": (make.SVG[:150], "cut off")}
     for name, (content, words) in bad.items():
