@@ -272,6 +272,34 @@ def test_labels_of_every_kind(_, here):
         expect(abs(file.attrs["corner_x"]) < 1e-12, "corner")
 
 
+IN_A_FILE = """
+import runpy, sys
+sys.path.insert(0, sys.argv[1])
+from converting import scratch
+scratch.SMALL = 0
+sys.argv[:2] = ["convert-labels"]
+runpy.run_path(sys.path[0] + "/convert-labels", run_name="__main__")
+"""
+
+
+def test_large_labels_are_the_same(_, here):
+    """Volumes that are worked on in a file give what those in memory do."""
+    if not has_scipy():
+        return print("labels: skipped, scipy is not there")
+    voxels = make.labels((40, 36, 70))
+    voxels[33, 20, 20] = 9
+    source = make.metaimage(voxels, here)
+    options = ["--unit", "mm", "--split", "--crop", "0,2,1,40,36,70"]
+    expect(convert(source, "-o", here / "memory.h5", *options).returncode == 0, "in memory")
+    done = subprocess.run([sys.executable, "-B", "-c", IN_A_FILE, ROOT / "scripts", source, "-o", here / "file.h5", *options],
+                          capture_output=True, text=True, timeout=120 * PATIENCE, check=False)
+    expect(done.returncode == 0 and "dropped" in done.stderr, done.stderr)
+    with h5py.File(here / "memory.h5") as a, h5py.File(here / "file.h5") as b:
+        expect(sorted(a) == sorted(b) and all(np.array_equal(a[n][()], b[n][()]) for n in a), "other values")
+        expect(len(a["depth"]) == 69 and a["depth"][()].max() == 255, "no depths")
+    expect(not list(here.glob("tmp*")), "a file is left")
+
+
 def test_labels_are_cleaned(_, here):
     if not has_scipy():
         return print("labels: skipped, scipy is not there")
