@@ -2,6 +2,7 @@
 
 import dataclasses
 import gzip
+import mmap
 import os
 import re
 import struct
@@ -18,32 +19,65 @@ IMAGES = (".tif", ".tiff", ".png", ".bmp")
 class Volume:
     """Voxels, the slowest direction first. Lengths as x, y, z; None where the file does not say them."""
 
-    voxels: np.ndarray
+    voxels: "np.ndarray | Planes"
     spacing: list | None = None
     first: list | None = None  # centre of the first voxel
     unit: str | None = None
 
+    def drop(self):
+        """Gives memory back that voxels of a file took which have been looked at."""
+        data = self.voxels
+        while isinstance(data, np.ndarray):
+            data = data.base
+        data = data.obj if isinstance(data, memoryview) else data
+        if isinstance(data, mmap.mmap):
+            data.madvise(mmap.MADV_DONTNEED)
 
-def finish(data, dtype, sizes, name, order="F"):
+
+class Planes:
+    """Voxels that are read when planes of them are asked for; read(first, last) gives these as an array."""
+
+    def __init__(self, shape, dtype, read):
+        self.shape, self.dtype, self.read = shape, np.dtype(dtype), read
+
+    def __getitem__(self, part):
+        first, last, _ = part.indices(self.shape[0])
+        return self.read(first, last)
+
+    def __array__(self, dtype=None):
+        return np.asarray(self.read(0, self.shape[0]), dtype)
+
+
+def finish(data, dtype, sizes, name):
     """Bytes as an array; `sizes` are x, y, z, x fastest."""
-    dtype, needed = np.dtype(dtype), int(np.prod(sizes, dtype=np.int64)) * np.dtype(dtype).itemsize
+    dtype, count = np.dtype(dtype), int(np.prod(sizes, dtype=np.int64))
+    needed = count * dtype.itemsize
     if len(data) < needed:
         raise InputError(f"{name}: holds {len(data)} bytes of voxels; {' x '.join(map(str, sizes))} of {dtype.itemsize} "
                          f"bytes need {needed}: it is cut off, or its header is wrong")
     if len(data) > needed:
         note(f"{name}: holds {len(data) - needed} bytes behind its voxels; they are left out")
-    array = np.frombuffer(data[:needed], dtype).reshape(sizes[::-1])
+    array = np.frombuffer(data, dtype, count).reshape(sizes[::-1])
     return array[0] if len(sizes) == 3 and sizes[2] == 1 else array
 
 
 def contents(path):
+    """The bytes of a file, which are read when they are looked at."""
     try:
         with open(path, "rb") as file:
-            return file.read()
+            try:
+                return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+            except (ValueError, OSError):  # an empty file, or none of a disk
+                return file.read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError:  # what a damaged head can make of a name
         raise InputError(f"{path}: is no name of a file") from None
+
+
+def behind(data, at):
+    """The bytes from a place on, not copied."""
+    return memoryview(data)[at:]
 
 
 def natural(name):
@@ -90,37 +124,62 @@ def tiff_lengths(image):
     return [per / float(tags[282]), per / float(tags[283])], None
 
 
+# What Pillow raises of damaged files.
+DAMAGES = (OSError, SyntaxError, ValueError, EOFError, KeyError, TypeError, OverflowError, MemoryError)
+
+
 def read_pages(path):
-    """A TIFF of one or more pages, a PNG or a BMP."""
-    from PIL import Image, ImageSequence  # pylint: disable=import-outside-toplevel
+    """A TIFF of one or more pages, a PNG or a BMP: an array or Planes, and lengths."""
+    from PIL import Image  # pylint: disable=import-outside-toplevel
     Image.MAX_IMAGE_PIXELS = None
     try:
         with Image.open(path) as image:
             plane, apart = tiff_lengths(image)
-            pages = [plane_of(page, f"{path}: page {i}") for i, page in enumerate(ImageSequence.Iterator(image))]
-    except (OSError, SyntaxError, ValueError, EOFError, KeyError, TypeError, OverflowError, MemoryError) as error:  # Pillow's own of damaged tags
-        try:
-            import tifffile  # pylint: disable=import-outside-toplevel
-            pages, plane, apart = list(np.atleast_3d(tifffile.imread(path))), None, None
-        except ImportError:
-            raise InputError(f"{path}: cannot be read as an image: {error}") from None
-        except Exception as other:  # whatever tifffile finds
-            raise InputError(f"{path}: cannot be read as an image: {error}; {other}") from None
-    if not pages:
+            count = getattr(image, "n_frames", 1)
+            image.seek(0)
+            page = plane_of(image, f"{path}: page 0")
+    except DAMAGES as error:
+        return by_tifffile(path, error), None, None
+    pages = Planes((count, *page.shape), page.dtype, lambda first, last: some_pages(path, first, last, page.shape))
+    return (page if count == 1 else pages), plane, apart
+
+
+def some_pages(path, first, last, shape):
+    from PIL import Image  # pylint: disable=import-outside-toplevel
+    pages = []
+    try:
+        with Image.open(path) as image:
+            for i in range(first, last):
+                image.seek(i)
+                pages.append(plane_of(image, f"{path}: page {i}"))
+                if pages[-1].shape != shape:
+                    raise InputError(f"{path}: page {i} is {pages[-1].shape[1]} x {pages[-1].shape[0]}, page 0 is "
+                                     f"{shape[1]} x {shape[0]}")
+    except DAMAGES as error:
+        return by_tifffile(path, error)[first:last]
+    return np.stack(pages)
+
+
+def by_tifffile(path, error):
+    """All pages of what Pillow cannot read."""
+    try:
+        import tifffile  # pylint: disable=import-outside-toplevel
+        pages = np.asarray(tifffile.imread(path))
+    except ImportError:
+        raise InputError(f"{path}: cannot be read as an image: {error}") from None
+    except Exception as other:  # whatever tifffile finds
+        raise InputError(f"{path}: cannot be read as an image: {error}; {other}") from None
+    if pages.ndim not in (2, 3) or not pages.size:
         raise InputError(f"{path}: holds no pages; it is cut off or damaged")
-    for i, page in enumerate(pages):
-        if page.shape != pages[0].shape:
-            raise InputError(f"{path}: page {i} is {page.shape[1]} x {page.shape[0]}, page 0 is "
-                             f"{pages[0].shape[1]} x {pages[0].shape[0]}")
-    return pages, plane, apart
+    return pages
 
 
-def from_pages(pages, plane, apart, name):
-    if len(pages) == 1:
-        return Volume(pages[0], plane, None, "m" if plane else None)
+def from_pages(voxels, plane, apart, name):
+    if len(voxels.shape) == 2:
+        return Volume(voxels, plane, None, "m" if plane else None)
     if plane and apart is None:
         note(f"{name}: gives {plane[0]:.6g} x {plane[1]:.6g} m in the page, and nothing for the distance of pages")
-    return Volume(np.stack(pages), plane + [apart] if plane else None, None, "m" if plane else None)
+    return Volume(voxels, plane + [apart] if plane else None, None, "m" if plane else None)
 
 
 def read_image(path):
@@ -132,13 +191,19 @@ def read_folder(path):
     names = sorted((n for n in os.listdir(path) if n.lower().endswith(IMAGES) and not n.startswith(".")), key=natural)
     if not names:
         raise InputError(f"{path}: holds no slices ({', '.join(IMAGES)})")
-    pages, plane, apart = [], None, None
-    for name in names:
-        slices, plane, apart = read_pages(os.path.join(path, name))
-        if len(slices) != 1 or slices[0].shape != (pages or slices)[0].shape:
-            raise InputError(f"{os.path.join(path, name)}: is not one page as large as {names[0]}")
-        pages += slices
-    return from_pages(pages, plane, apart, path)
+    names = [os.path.join(path, n) for n in names]
+    page, plane, apart = read_pages(names[0])
+
+    def slices(first, last):
+        pages = [read_pages(name)[0] for name in names[first:last]]
+        for name, found in zip(names[first:last], pages):
+            if len(found.shape) != 2 or found.shape != page.shape:
+                raise InputError(f"{name}: is not one page as large as {os.path.basename(names[0])}")
+        return np.stack(pages)
+
+    if len(names) == 1 or len(page.shape) != 2:
+        return from_pages(slices(0, 1)[0], plane, apart, path)
+    return from_pages(Planes((len(names), *page.shape), page.dtype, slices), plane, apart, path)
 
 
 META_TYPES = {"MET_CHAR": "i1", "MET_UCHAR": "u1", "MET_SHORT": "i2", "MET_USHORT": "u2", "MET_INT": "i4",
@@ -173,7 +238,7 @@ def read_meta(path):
         raise InputError(f"{path}: TransformMatrix turns the volume; resample it along its axes")
     name = head["ElementDataFile"]
     if name == "LOCAL":
-        raw, name = data[at:], path
+        raw, name = behind(data, at), path
     else:
         name = os.path.join(os.path.dirname(path), name)
         raw = contents(name)
@@ -183,7 +248,7 @@ def read_meta(path):
         except zlib.error as error:
             raise InputError(f"{name}: cannot be unpacked ({error}); it is cut off or damaged") from None
     elif int(head.get("HeaderSize", "0")) > 0:
-        raw = raw[int(head["HeaderSize"]):]
+        raw = behind(raw, int(head["HeaderSize"]))
     big = head.get("BinaryDataByteOrderMSB", head.get("ElementByteOrderMSB", "False")).lower() == "true"
     voxels = finish(raw, (">" if big else "<") + META_TYPES[head["ElementType"]], sizes, name)
     spacing = head.get("ElementSpacing", head.get("ElementSize"))
@@ -209,7 +274,7 @@ def nrrd_type(text, path):
 def read_nrrd(path):
     data = contents(path)
     end = re.search(rb"\r?\n\r?\n", data)
-    head_text = data[:end.start()] if end else data
+    head_text = data[:end.start() if end else len(data)]
     head, lines = {}, head_text.decode("latin-1").splitlines()
     for i, line in enumerate(lines[1:], 2):
         if line.startswith("#") or ":=" in line or not line.strip():
@@ -228,14 +293,14 @@ def read_nrrd(path):
     sizes, code = numbers(head["sizes"], count, f"{path}: sizes", int), nrrd_type(head["type"], path)
     beside = head.get("data file", head.get("datafile"))
     name = os.path.join(os.path.dirname(path), beside) if beside else path
-    raw = contents(name) if beside else data[end.end():] if end else b""
+    raw = contents(name) if beside else behind(data, end.end()) if end else b""
     try:
         if head["encoding"] in ("gzip", "gz"):
             raw = gzip.decompress(raw)
     except (EOFError, OSError, zlib.error) as error:
         raise InputError(f"{name}: cannot be unpacked ({error}); it is cut off or damaged") from None
     if head["encoding"] in ("ascii", "text", "txt"):
-        raw = np.array(raw.split(), dtype=float).astype(code).tobytes()
+        raw = np.array(bytes(raw).split(), dtype=float).astype(code).tobytes()
     elif head["encoding"] not in ("raw", "gzip", "gz"):
         raise InputError(f"{path}: the encoding '{head['encoding']}' is not read; known are raw, gzip, ascii")
     order = ">" if head.get("endian", "little") == "big" and head["encoding"] not in ("ascii", "text", "txt") else "<"
@@ -259,7 +324,7 @@ NIFTI_TYPES = {2: "u1", 4: "i2", 8: "i4", 16: "f4", 64: "f8", 256: "i1", 512: "u
 
 def read_nifti(path):
     data = contents(path)
-    if data.startswith(b"\x1f\x8b"):
+    if data[:2] == b"\x1f\x8b":
         try:
             data = gzip.decompress(data)
         except (EOFError, OSError, zlib.error) as error:
@@ -276,10 +341,10 @@ def read_nifti(path):
         sizes.pop()
     if code not in NIFTI_TYPES or len(sizes) not in (2, 3):
         raise InputError(f"{path}: {len(sizes)} dimensions of type {code} are not read")
-    raw, name = data[int(start):], path
+    raw, name = behind(data, int(start)), path
     if data[344:347] == b"ni1":
         name = re.sub(r"\.hdr(\.gz)?$", ".img", path)
-        raw = contents(name)[int(start):]
+        raw = behind(contents(name), int(start))
     voxels = finish(raw, order + NIFTI_TYPES[code], sizes, name)
     if slope not in (0.0, 1.0) or inter != 0.0:
         voxels = voxels * float(slope or 1.0) + float(inter)
@@ -302,15 +367,31 @@ def read_hdf5(path, wanted):
             name = wanted or found[0]
             if name not in file:
                 raise InputError(f"{path}: has no data set '{name}'; it holds {', '.join(found[:8])}")
-            voxels = file[name][()]
+            voxels = planes_of_data(path, name, file[name])
             geometry = next((file[g] for g in walk(file) if g.endswith("_SIMPL_GEOMETRY")), None)
             spacing = [float(v) for v in geometry["SPACING"][()]] if geometry and "SPACING" in geometry else None
             origin = [float(v) for v in geometry["ORIGIN"][()]] if geometry and "ORIGIN" in geometry else None
     except (OSError, KeyError, RuntimeError) as error:
         raise InputError(f"{path}: cannot be read as HDF5: {error}") from None
-    voxels = voxels.reshape([n for n in voxels.shape if n > 1])
     first = [o + s / 2 for o, s in zip(origin, spacing)] if origin and spacing else None
     return Volume(voxels, spacing, first)
+
+
+def planes_of_data(path, name, data):
+    """The values of a data set without its axes of one, when they are asked for."""
+    import h5py  # pylint: disable=import-outside-toplevel
+    sizes = [n for n in data.shape if n > 1]
+    if not data.shape or data.shape[0] == 1 or len(sizes) < 2:
+        return data[()].reshape(sizes)
+
+    def read(first, last):
+        try:
+            with h5py.File(path, "r") as file:
+                return file[name][first:last].reshape([last - first, *sizes[1:]])
+        except (OSError, KeyError, RuntimeError) as error:
+            raise InputError(f"{path}: cannot be read as HDF5: {error}") from None
+
+    return Planes(sizes, data.dtype, read)
 
 
 def walk(file):
@@ -322,7 +403,7 @@ def walk(file):
 def read_tesr(path):
     """Raster tessellation of Neper."""
     data = contents(path)
-    if not data.lstrip().startswith(b"***tesr"):
+    if not data[:1000].lstrip().startswith(b"***tesr"):
         raise InputError(f"{path}:1: does not begin with ***tesr")
     mark = re.search(rb"\*\*general\s+(\d)\s", data)
     body = re.search(rb"\*\*data\s+(\S+)[^\S\n]*\n", data)
@@ -336,11 +417,11 @@ def read_tesr(path):
     spacing = numbers(" ".join(words[count:2 * count]), count, f"{path}: **general")
     origin = re.search(rb"\*origin\s+([^*]*)", data[mark.end():body.start()])
     low = numbers(origin.group(1).decode(), count, f"{path}: *origin") if origin else [0.0] * count
-    form, rest = body.group(1).decode(), data[body.end():]
+    form, rest = body.group(1).decode(), behind(data, body.end())
     if form == "*file":
         raise InputError(f"{path}: holds its voxels in another file; write it with the format ascii")
     if form == "ascii":
-        words = rest.split(b"***end")[0].split()
+        words = bytes(rest).split(b"***end")[0].split()
         if len(words) != int(np.prod(sizes)):
             raise InputError(f"{path}: holds {len(words)} voxels; {int(np.prod(sizes))} are needed: it is cut off")
         try:

@@ -1,4 +1,4 @@
-"""What scripts/convert-labels does with labels: pieces, sizes, and the file."""
+"""What scripts/convert-labels does with labels: pieces, sizes, and the file. Volumes are gone through by slabs."""
 
 import h5py
 import numpy as np
@@ -6,6 +6,10 @@ from scipy import ndimage
 
 from converting import smoothing
 from converting.common import InputError, note
+from converting.scratch import slabs_of
+
+PLANES = 32  # of a slab: those of a chunk of the file
+
 
 def whole(voxels, name):
     """As whole numbers from 0 on, and the labels themselves."""
@@ -31,8 +35,6 @@ def by_ranges(voxels, ranges):
 def majority(voxels, n):
     """Blocks of n voxels a side become one, of the label most of them have; sides that n does not divide lose a rest."""
     sizes = [s // n for s in voxels.shape]
-    if min(sizes) < 1:
-        raise InputError(f"--downsample {n}: is more than the {min(voxels.shape)} voxels along a side")
     cut = voxels[tuple(slice(0, s * n) for s in sizes)]
     shape = [v for s in sizes for v in (s, n)]
     d = len(sizes)
@@ -46,28 +48,79 @@ def majority(voxels, n):
     return best
 
 
-def boxes(voxels):
-    """(label, slices) of each label but void."""
-    found = np.unique(voxels)
-    found = found[found != 0]
-    if len(found) and int(found[-1]) > 4 * len(found) + 1000:  # far from consecutive
-        dense = np.searchsorted(found, voxels) + 1
-        dense[voxels == 0] = 0
-        return list(zip(found.tolist(), ndimage.find_objects(dense.astype(np.int32))))
-    slices = ndimage.find_objects(voxels.astype(np.int64, copy=False))
-    return [(int(label), slices[int(label) - 1]) for label in found]
+def planes_of(volume):
+    """How many planes of a volume, or rows of an image, are a slab."""
+    return PLANES if len(volume.shape) == 3 else 1024
 
 
-def pieces(voxels, split, smallest):
-    """Labels with their stray pieces gone, and what there is to say. With `split` each piece is a label of its own."""
-    said, following = [], int(voxels.max()) + 1
-    result = voxels.astype(np.uint32)
-    for label, box in boxes(voxels):
-        inside = voxels[box] == label
+def gathered(volume, part, change, n, scratch):
+    """The labels that `change` makes of the voxels of a part (slices) of a volume, by slabs; n planes of it become one."""
+    result, begin = None, part[0].start
+    thick = n * max(1, planes_of(volume.voxels) // n)
+    for first, last in slabs_of((part[0].stop - begin) // n * n, thick):
+        slab = change(volume.voxels[begin + first:begin + last][(slice(None), *part[1:])])
+        if result is None:
+            result = scratch.new(((part[0].stop - begin) // n, *slab.shape[1:]), np.uint32)
+        result[first // n:first // n + len(slab)] = slab
+        scratch.drop()
+        volume.drop()
+    return result
+
+
+def found_in(voxels, scratch):
+    """The labels but void, ascending."""
+    found = np.zeros(0, np.uint32)
+    for first, last in slabs_of(len(voxels), planes_of(voxels)):
+        part = voxels[first:last].reshape(-1)
+        low, high = int(part.min()), int(part.max())
+        new = np.flatnonzero(np.bincount(part - np.uint32(low))) + low if high - low < 1 << 22 else np.unique(part)
+        found = np.union1d(found, new)
+        scratch.drop()
+    return found[found != 0].astype(np.uint32)
+
+
+def dense(voxels, scratch):
+    """The labels but void, ascending, and the voxels with 0 for void and 1, 2, ... for these."""
+    found = found_in(voxels, scratch)
+    index = scratch.new(voxels.shape, np.uint16 if len(found) < 1 << 16 else np.uint32)
+    table = None
+    if len(found) and found[-1] < 1 << 22:
+        table = np.zeros(int(found[-1]) + 1, index.dtype)
+        table[found] = np.arange(1, len(found) + 1)
+    for first, last in slabs_of(len(voxels), planes_of(voxels)):
+        part = voxels[first:last]
+        if table is not None:
+            np.take(table, part, out=index[first:last], mode="clip")
+        else:
+            index[first:last] = np.where(part == 0, 0, np.searchsorted(found, part) + 1)
+        scratch.drop()
+    return found, index
+
+
+def boxes(index, scratch):
+    """Slices of each label of `dense`, without void."""
+    lower, upper = {}, {}
+    for first, last in slabs_of(len(index), planes_of(index)):
+        for number, box in enumerate(ndimage.find_objects(index[first:last])):
+            if box:
+                low, high = [s.start for s in box], [s.stop for s in box]
+                low[0], high[0] = low[0] + first, high[0] + first
+                lower[number] = list(map(min, lower.get(number, low), low))
+                upper[number] = list(map(max, upper.get(number, high), high))
+        scratch.drop()
+    return [tuple(map(slice, lower[n], upper[n])) for n in range(len(lower))]
+
+
+def pieces(voxels, split, smallest, scratch):
+    """Takes the stray pieces of labels away, and tells what there is to say. With `split` each piece is a label of its own."""
+    found, index = dense(voxels, scratch)
+    said, following = [], int(found[-1]) + 1 if len(found) else 1
+    for number, box in enumerate(boxes(index, scratch), 1):
+        label, inside = int(found[number - 1]), index[box] == number
         parts, count = ndimage.label(inside)
         sizes = np.bincount(parts.ravel())[1:]
         small = [i + 1 for i, size in enumerate(sizes) if size < smallest]
-        view = result[box]
+        view = voxels[box]
         for i in small:
             view[parts == i] = 0
             where = [int(v.start + p) for v, p in zip(box, np.argwhere(parts == i)[0])]
@@ -82,18 +135,22 @@ def pieces(voxels, split, smallest):
                 view[parts == i] = following
                 said.append(f"label {label}: its piece of {sizes[i - 1]} voxels becomes label {following}")
                 following += 1
-    return result, said
+        scratch.drop()
+    return said
 
 
-def touching(voxels):
+def touching(voxels, scratch):
     """Pairs of labels with a face between them."""
     pairs = set()
-    for axis in range(voxels.ndim):
-        a, b = np.moveaxis(voxels, axis, 0)[:-1], np.moveaxis(voxels, axis, 0)[1:]
-        differ = (a != b) & (a != 0) & (b != 0)
-        low, high = np.minimum(a[differ], b[differ]), np.maximum(a[differ], b[differ])
-        codes = np.unique(low.astype(np.uint64) << np.uint64(32) | high.astype(np.uint64))
-        pairs.update((int(c >> np.uint64(32)), int(c & np.uint64(0xFFFFFFFF))) for c in codes)
+    for first, last in slabs_of(len(voxels), planes_of(voxels)):
+        slab = voxels[first:last + 1]
+        for axis in range(voxels.ndim):
+            a, b = np.moveaxis(slab, axis, 0)[:-1], np.moveaxis(slab, axis, 0)[1:]
+            at = np.nonzero(a != b)
+            a, b = a[at], b[at]
+            codes = np.unique(np.minimum(a, b).astype(np.uint64) << np.uint64(32) | np.maximum(a, b).astype(np.uint64))
+            pairs.update((int(c >> np.uint64(32)), int(c & np.uint64(0xFFFFFFFF))) for c in codes if c >> np.uint64(32))
+        scratch.drop()
     return pairs
 
 
@@ -105,32 +162,21 @@ def inscribed(inside, spacing):
     return at, max(float(distance[at]) - 0.5 * max(spacing), 0.25 * min(spacing))
 
 
-def dense(voxels):
-    """The labels but void, ascending, and the voxels with 0 for void and 1, 2, ... for these; three axes."""
-    found = np.flatnonzero(np.bincount(voxels.ravel())) if voxels.dtype.itemsize < 4 else np.unique(voxels)
-    found = found[found != 0]
-    kind = np.uint16 if len(found) < 1 << 16 else np.uint32
-    index = np.empty(voxels.shape, kind)
-    for z, page in enumerate(voxels):
-        index[z] = np.searchsorted(found, page) + 1
-        index[z][page == 0] = 0
-    return found, index.reshape((1,) * (3 - index.ndim) + index.shape)
-
-
-def facts(voxels, spacing, corner):
+def facts(voxels, spacing, corner, scratch):
     """The table of the labels, columns by name, and the depth of each voxel; spacing and corner as x, y, z."""
-    found, index = dense(voxels)
+    found, index = dense(voxels, scratch)
     if not len(found):
         raise InputError("no label but void (0) is left")
-    counts = np.bincount(index.ravel())
-    depth = smoothing.depths(index, len(counts))
-    weights, error = smoothing.weights_for(index, depth, counts)
+    counts = sum(np.bincount(index[a:b].ravel(), minlength=len(found) + 1) for a, b in slabs_of(len(index), planes_of(index)))
+    scratch.drop()
+    solid = index.reshape((1,) * (3 - index.ndim) + index.shape)
+    depth, faces = smoothing.depths(solid, len(counts), scratch)
+    weights, error = smoothing.weights_for(solid, depth, counts, faces, scratch)
     for i in np.argsort(-np.abs(error))[:5]:
         if abs(error[i]) > 0.005:
             note(f"label {found[i]} of {counts[i + 1]} voxels: its smooth surface encloses {100 * error[i]:+.1f} %")
     rows = {name: [] for name in ("label", "count", "lower", "upper", "inner_centre", "inner_radius", "weight")}
-    index = index.reshape(voxels.shape)
-    for number, box in enumerate(ndimage.find_objects(index.astype(np.int32, copy=False)), 1):
+    for number, box in enumerate(boxes(index, scratch), 1):
         at, radius = inscribed(index[box] == number, spacing[::-1])
         rows["label"].append(int(found[number - 1]))
         rows["count"].append(int(counts[number]))
@@ -140,12 +186,13 @@ def facts(voxels, spacing, corner):
         rows["inner_centre"].append([c + h * m for c, h, m in zip(corner, spacing, middle)])
         rows["inner_radius"].append(radius)
         rows["weight"].append(float(weights[number - 1]))
+        scratch.drop()
     return rows, depth.reshape(voxels.shape)
 
 
-def write(path, voxels, depth, spacing, corner, rows, source):
+def write(path, voxels, depth, spacing, corner, rows, source, scratch):
     """The file that [[labels]] reads."""
-    largest = int(voxels.max())
+    largest = max(rows["label"])
     kind = next(t for t in (np.uint8, np.uint16, np.uint32) if largest <= np.iinfo(t).max)
     with h5py.File(path, "w") as file:
         file.attrs["kind"] = np.bytes_("labels")
@@ -153,8 +200,11 @@ def write(path, voxels, depth, spacing, corner, rows, source):
         for axis, h, c in zip("xyz", spacing, corner):
             file.attrs[f"spacing_{axis}"], file.attrs[f"corner_{axis}"] = float(h), float(c)
         chunk = tuple(min(n, 32 if voxels.ndim == 3 else 256) for n in voxels.shape)
-        for name, values in (("voxels", voxels.astype(kind, copy=False)), ("depth", depth)):
-            file.create_dataset(name, data=values, chunks=chunk, compression="gzip", compression_opts=1, shuffle=True)
+        for name, values, code in (("voxels", voxels, kind), ("depth", depth, np.uint8)):
+            data = file.create_dataset(name, values.shape, code, chunks=chunk, compression="gzip", compression_opts=1, shuffle=True)
+            for first, last in slabs_of(len(values), chunk[0]):
+                data[first:last] = values[first:last].astype(code, copy=False)
+                scratch.drop()
         for name, values in rows.items():
             file.create_dataset(name, data=np.array(values, dtype=np.int64 if name in ("label", "count", "lower", "upper")
                                                     else np.float64))

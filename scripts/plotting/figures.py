@@ -68,12 +68,13 @@ def grain_picture(run: Run, frame: Frame, pixels: int = PIXELS, colour=None) -> 
     return raster.paint_bodies(pixels_of(run, frame, pixels).nearest(), bodies_of(frame), colour or colours.of_run(run))
 
 
-def value_picture(run: Run, frame: Frame, values: np.ndarray, scale: tuple, pixels: int = PIXELS) -> np.ndarray:
+def value_picture(run: Run, frame: Frame, shown: Scalar, scale: tuple, pixels: int = PIXELS) -> np.ndarray:
     """Points' values in the colours of a scale (low, high, name) (2D; rows upwards)."""
-    place, body = pixels_of(run, frame, pixels), bodies_of(frame)
+    place, body, values = pixels_of(run, frame, pixels), bodies_of(frame), shown.values(run, frame)
     owner = place.nearest()
-    shown = values[owner] if run.raw_stress else place.blended(owner, body, values)
-    return raster.paint_values(owner, body, colours.mapped(shown, *scale))
+    colour = colours.mapped(values[owner] if run.raw_stress else place.blended(owner, body, values), *scale)
+    colour[np.isin(body, shown.lacking(run, frame))[owner]] = colours.DRIVEN
+    return raster.paint_values(owner, body, colour)
 
 
 def _title(run: Run, frame: Frame) -> str:
@@ -181,12 +182,11 @@ def principal_stress(run: Run, other: Run | None, folder: Path, summary: dict) -
     if any(frame.points == 0 for frame in frames):
         raise MissingData("there are no points any more")
     shown = SCALARS["difference"]
-    values = [shown.values(run, frame) for frame in frames]
-    top = max(float(np.percentile(value, 99)) for value in values)
+    top = max(shown.noise(run), *(float(np.percentile(shown.values(run, frame), 99)) for frame in frames))
     scale = (0.0, top if top > 0 else 1.0, "stress")
     figure, row = plt.subplots(1, len(frames), figsize=(7 * len(frames), 7), squeeze=False)
-    for axes, frame, value in zip(row[0], frames, values):
-        _show(axes, run.at(frame), value_picture(run, frame, value, scale), _title(run, frame))
+    for axes, frame in zip(row[0], frames):
+        _show(axes, run.at(frame), value_picture(run, frame, shown, scale), _title(run, frame))
     _scale_bar(figure, list(row[0]), *scale, shown)
     summary["principal_stress_scale_Pa"] = top
     summary["principal_stress_field"] = run.stress_name(frames[0])
@@ -255,7 +255,7 @@ def values(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str
     scale = scale_of(run, frames, shown, run.look.range)
     for frame, name in zip(frames, names):
         figure, axes = plt.subplots(figsize=(8, 7))
-        _show(axes, run.at(frame), value_picture(run, frame, shown.values(run, frame), scale), _title(run, frame))
+        _show(axes, run.at(frame), value_picture(run, frame, shown, scale), _title(run, frame))
         _scale_bar(figure, [axes], *scale, shown)
         _save(figure, folder, name)
     return names
@@ -344,23 +344,25 @@ def displacement_profile(run: Run, other: Run | None, folder: Path, summary: dic
 def energy(run: Run, other: Run | None, folder: Path, summary: dict) -> list[str]:
     """The energy book of history.csv against time: every account, the work done at the boundary, and the error."""
     history = run.history()
-    time = history["time"]
+    factor, unit = prefixed(history["time"][-1], "s")
+    time = factor * history["time"]
     accounts = [name for name in history if name.endswith(("_energy", "_dissipation"))]
     figure, (upper, lower) = plt.subplots(2, 1, figsize=(7, 7), sharex=True, height_ratios=(3, 1))
-    for name in accounts:
-        upper.plot(time, history[name], lw=1.3, label=name.replace("_", " "))
+    for k, name in enumerate(accounts):  # each has its colour in all pictures
+        if np.any(history[name] != 0):
+            upper.plot(time, history[name], "-" if k < 10 else ":", color=f"C{k % 10}", lw=1.3, label=name.replace("_", " "))
     if "boundary_work" in history:
         upper.plot(time, history["boundary_work"], "k--", lw=1, label="boundary work (in)")
     metre = " / m" if run.dimension == 2 else ""
     upper.set_ylabel(f"energy [J{metre}]")
-    upper.set_title(run.title, fontsize=10)
-    upper.legend(fontsize=8)
+    upper.set_title(run.title, fontsize=10, color="firebrick" if run.failed else "black")
+    upper.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1), frameon=False)
     if "energy_error" in history:
         lower.plot(time, history["energy_error"], lw=1.2, color="C3")
         summary["energy_error_max"] = float(np.nanmax(np.abs(history["energy_error"])))
     lower.axhline(0, color="k", lw=0.5)
     lower.set_ylabel("energy error [1]")
-    lower.set_xlabel("time [s]")
+    lower.set_xlabel(f"time [{unit}]")
     for name in accounts:
         summary.setdefault("energy_at_end_J", {})[name] = float(history[name][-1])
     _compare_plastic_work(run, other, summary)

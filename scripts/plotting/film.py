@@ -60,7 +60,7 @@ def _drawer(run: Run) -> Callable[[Frame], Image.Image]:
     def draw(frame: Frame) -> Image.Image:
         row = []
         for shown, ends in zip(panels, scales):
-            picture = (value_picture(run, frame, shown.values(run, frame), ends, pixels) if shown
+            picture = (value_picture(run, frame, shown, ends, pixels) if shown
                        else grain_picture(run, frame, pixels, colour))
             picture = _in_domain(picture, run.at(frame).upper - run.lower, largest)
             title = shown.title if shown and row else f"{run.title}   {label(run, frame)}"

@@ -16,6 +16,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from canvas import prefixed
 from results import MissingData, Run
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # where measuring is
@@ -89,11 +90,12 @@ def stress_strain(run: Run, other: Run | None, folder: Path, summary: dict) -> l
     tensor = np.array([[table[f"strain_{min(a, b)}{max(a, b)}"] for b in names] for a in names])
     deviator = tensor - np.eye(len(names))[:, :, None] * np.trace(tensor) / len(names)
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.2))
+    stress = {a: -(table[f"stress_{a}{a}"] + table[f"kinetic_stress_{a}{a}"]) for a in names}
+    factor, unit = prefixed(np.nanmax(np.abs(list(stress.values()))), "Pa")
     for a in names:
-        left.plot(strains[axis], -(table[f"stress_{a}{a}"] + table[f"kinetic_stress_{a}{a}"]), ".-", lw=1, ms=4,
-                  label=f"along {a}")
+        left.plot(strains[axis], factor * stress[a], ".-", lw=1, ms=4, label=f"along {a}")
     left.set_xlabel(f"compression along {axis} (Hencky)")
-    left.set_ylabel("compressive stress [Pa]")
+    left.set_ylabel(f"compressive stress [{unit}]")
     left.legend(fontsize=8)
     right.plot(np.sqrt(2 * (deviator**2).sum(axis=(0, 1))), table["mu"], ".-", lw=1, ms=4, color="C3")
     right.set_xlabel("shear strain, sqrt(2 e:e)")
@@ -111,8 +113,9 @@ def coordination(run: Run, other: Run | None, folder: Path, summary: dict) -> li
               label="without rattlers")
     left.set_ylabel("coordination Z")
     left.legend(fontsize=8)
-    right.plot(table["packing_fraction"], table["pressure"], ".-", lw=1, ms=4, color="C3")
-    right.set_ylabel("pressure [Pa]")
+    factor, unit = prefixed(np.nanmax(np.abs(table["pressure"])), "Pa")
+    right.plot(table["packing_fraction"], factor * table["pressure"], ".-", lw=1, ms=4, color="C3")
+    right.set_ylabel(f"pressure [{unit}]")
     for axes in (left, right):
         axes.set_xlabel("packing fraction")
     figure.suptitle(run.title, fontsize=10)
@@ -157,7 +160,7 @@ def fabric_rose(run: Run, other: Run | None, folder: Path, summary: dict) -> lis
     contacts = snapshot.contacts
     angle = np.arctan2(contacts.normal[:, 1], contacts.normal[:, 0])
     both = np.concatenate([angle, angle + np.pi]) % (2 * np.pi)
-    sector = np.minimum((both / (2 * np.pi) * SECTORS).astype(int), SECTORS - 1)
+    sector = np.rint(both / (2 * np.pi) * SECTORS).astype(int) % SECTORS  # one lies around each axis
     count = np.bincount(sector, minlength=SECTORS)
     push = np.bincount(sector, np.tile(contacts.normal_force, 2), SECTORS) / np.maximum(count, 1)
     tensors = network.fabric(contacts), network.force_fabrics(contacts)[0]
@@ -165,7 +168,7 @@ def fabric_rose(run: Run, other: Run | None, folder: Path, summary: dict) -> lis
     roses = ((count / count.mean(), tensors[0], "contacts, over the mean"),
              (carried, tensors[1], "normal force they carry, over the mean"))
     figure, pair = plt.subplots(1, 2, figsize=(10, 5), subplot_kw={"projection": "polar"})
-    theta, fine = (np.arange(SECTORS) + 0.5) * 2 * np.pi / SECTORS, np.linspace(0, 2 * np.pi, 361)
+    theta, fine = np.arange(SECTORS) * 2 * np.pi / SECTORS, np.linspace(0, 2 * np.pi, 361)
     for axes, (values, tensor, title) in zip(pair, roses):
         axes.bar(theta, values, width=2 * np.pi / SECTORS, alpha=0.6)
         a, at = network.anisotropy(tensor), np.radians(network.direction(tensor))
@@ -195,12 +198,13 @@ def profiles(run: Run, other: Run | None, folder: Path, summary: dict) -> list[s
     panels = (("packing fraction", ["packing_fraction"]),
               ("velocity [m/s]", [n for n in names if n.startswith("velocity")]),
               ("stress by contacts [Pa]", [n for n in names if n.startswith("contact_stress")]),
-              ("granular temperature [m2/s2]", ["temperature"]))
+              ("granular temperature [m\N{SUPERSCRIPT TWO}/s\N{SUPERSCRIPT TWO}]", ["temperature"]))
     figure, row = plt.subplots(1, len(panels), figsize=(15, 4.2), sharey=True)
     for axes, (title, columns) in zip(row, panels):
         for name in columns:
             axes.plot(mean[name], mean[axis], lw=1.2, label=name.rpartition("_")[2])
         axes.set_xlabel(title)
+        axes.locator_params(axis="x", nbins=5)
         if len(columns) > 1:
             axes.legend(fontsize=7)
     row[0].set_ylabel(f"{axis} [m]")

@@ -7,6 +7,7 @@ import base64
 import datetime
 import html
 import json
+import struct
 import subprocess
 import sys
 import tempfile
@@ -26,6 +27,7 @@ from results import Damaged, MissingData, Run, reading
 
 BALANCED = 0.01  # largest energy error that needs no warning
 MOST_ROWS = 40  # of a table of tools
+WIDE = 1.7  # width over height from which on a picture goes across the page
 COUNTS = {"points_lost": "material points were lost and dropped", "points_left": "material points left through free faces",
           "points_stopped": "times a material point was kept from crossing a wall"}
 CAPTIONS = {"grains_start": "Bodies at the start", "grains_75": "Bodies at 75 % shear", "grains_end": "Bodies at the end",
@@ -35,6 +37,7 @@ STYLE = """body { font: 15px/1.5 "DejaVu Sans", Helvetica, Arial, sans-serif; ma
 h1 { font-size: 1.6em; } h2 { font-size: 1.2em; border-bottom: 1px solid #ccc; margin-top: 2em; }
 table { border-collapse: collapse; font-size: 0.85em; } th, td { text-align: left; padding: 2px 12px 2px 0; vertical-align: top; border-bottom: 1px solid #eee; }
 td.n { text-align: right; font-variant-numeric: tabular-nums; } .warning { color: #b01414; } figure { margin: 1em 0; break-inside: avoid; }
+.pictures { display: grid; grid-template-columns: 1fr 1fr; gap: 0 1em; align-items: end; } .wide { grid-column: span 2; }
 img { max-width: 100%; max-height: 34em; } figcaption { font-size: 0.85em; color: #555; } pre { font-size: 0.75em; background: #f6f6f6; padding: 1em; overflow-x: auto; white-space: pre-wrap; overflow-wrap: anywhere; }
 @media print { body { margin: 0; max-width: none; font-size: 11px; } h2 { break-after: avoid; } img { max-height: 60vh; } }"""
 
@@ -144,9 +147,10 @@ def provenance(run: Run) -> str:
 
 
 def image(path: Path, caption: str) -> str:
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    words = html.escape(caption)
-    return (f'<figure><img alt="{words}" src="data:image/png;base64,{data}">'
+    content, words = path.read_bytes(), html.escape(caption)
+    data = base64.b64encode(content).decode("ascii")
+    width, height = struct.unpack(">II", content[16:24])  # of a PNG
+    return (f'<figure{" class=wide" if width > WIDE * height else ""}><img alt="{words}" src="data:image/png;base64,{data}">'
             f"<figcaption>{words}</figcaption></figure>")
 
 
@@ -161,7 +165,7 @@ def pictures(run: Run, folder: Path) -> str:
                 made.append(image(folder / name, CAPTIONS.get(name[:-4], name[:-4].replace("_", " ").capitalize())))
         except MissingData as reason:
             missing.append((figure.__name__.replace("_", " "), str(reason)))
-    return "".join(made) + ("<p>Not drawn:</p>" + table(missing) if missing else "")
+    return f"<div class=pictures>{''.join(made)}</div>" + ("<p>Not drawn:</p>" + table(missing) if missing else "")
 
 
 def energies(run: Run, folder: Path) -> str:

@@ -182,6 +182,19 @@ class Run:
             return "stress"
         return "stress_smooth" if frame.has("stress_smooth") else "stress, smoothed"
 
+    @property
+    def stiffness(self) -> float:
+        """The largest modulus of a material [Pa]; 0 where none has one."""
+        laws = self.case.get("materials", {}).values()
+        return max((float(value) for law in laws for key, value in law.items()
+                    if key.endswith("modulus") and isinstance(value, (int, float))), default=0.0)
+
+    def unstressed(self, frame: Frame) -> np.ndarray:
+        """Bodies whose stress is not computed: rigid or driven ones, at none of whose points there is any."""
+        body = frame.field("body")
+        bearing = body[frame.field(self.stress_name(frame).split(",")[0]).any(axis=1)]
+        return np.setdiff1d(np.union1d(self._moved_alike, np.flatnonzero(self.bodies.tool)), bearing)
+
     def stress(self, frame: Frame) -> np.ndarray:
         """Stress to look at (N x 6: xx yy zz xy yz xz) [Pa]."""
         name = self.stress_name(frame)
@@ -277,7 +290,14 @@ class Run:
 
     @cached_property
     def driven_bodies(self) -> np.ndarray:
-        """Ids of the bodies moved as rigid parts: all their points keep one and the same prescribed velocity."""
+        """Ids of the bodies that are rigid, or moved as rigid parts."""
+        last = self.frames[-1]
+        bare = self.unstressed(last) if last.points and last.has("body") and self.has_stress(last) else []
+        return np.union1d(self._moved_alike, bare).astype(int)
+
+    @cached_property
+    def _moved_alike(self) -> np.ndarray:
+        """Ids of the bodies all of whose points keep one and the same prescribed velocity."""
         last = self.frames[-1]
         if not (self._prescribed and last.points and last.has("velocity") and last.has("body")):
             return np.array([], int)

@@ -10,6 +10,9 @@ import numpy as np
 from results import COMPONENTS, Frame, MissingData, Run, principal_stress_difference
 
 
+ROUNDING = 1e-12  # of the stiffness: stress that is none
+
+
 @dataclass
 class Scalar:
     """One value for each point."""
@@ -18,6 +21,14 @@ class Scalar:
     unit: str
     values: Callable[[Run, Frame], np.ndarray]
     signed: bool = False  # negative and positive values mean opposite things
+
+    def lacking(self, run: Run, frame: Frame) -> np.ndarray:
+        """The bodies that have no such value, which are grey."""
+        return run.unstressed(frame) if self.unit == "Pa" and frame.has("body") else np.zeros(0, int)
+
+    def noise(self, run: Run) -> float:
+        """Below this a value is the rounding error of another."""
+        return ROUNDING * run.stiffness if self.unit == "Pa" else 0.0
 
 
 def mean_pressure(stress: np.ndarray) -> np.ndarray:
@@ -71,15 +82,18 @@ def scalar(run: Run, frame: Frame, name: str) -> Scalar:
 def scale(run: Run, frames: list[Frame], shown: Scalar, wanted: tuple[float, float] | None) -> tuple[float, float, str]:
     """Ends of one colour scale for all frames, and the name of its map (colours.MAPS)."""
     sample = frames[:: -(-len(frames) // 8)] if frames else []
-    low, high = wanted or limits([shown.values(run, frame) for frame in sample], shown.signed)
+    low, high = wanted or limits([shown.values(run, frame) for frame in sample], shown.signed, shown.noise(run))
     return low, high, "diverging" if low < 0 < high else "sequential"
 
 
-def limits(values: list[np.ndarray], signed: bool) -> tuple[float, float]:
-    """Ends of the colour scale: 99 of 100 points lie between them; zero in the middle where values have signs."""
+def limits(values: list[np.ndarray], signed: bool, least: float = 0.0) -> tuple[float, float]:
+    """Ends of the colour scale: 99 of 100 points lie between them; zero in the middle where values have signs. Where all
+    are below `least`, it ends there, so that rounding errors are not seen as a pattern."""
     values = np.concatenate([np.ravel(v) for v in values]) if values else np.zeros(0)
     if not len(values):
         return 0.0, 1.0
+    if np.abs(values).max() < least:
+        return (-least, least) if signed else (0.0, least)
     if signed and values.min() < 0:
         top = float(np.percentile(np.abs(values), 99))
         return (-top, top) if top > 0 else (-1.0, 1.0)

@@ -136,9 +136,11 @@ class Scene:
             add_balls(seen, paint_balls(place[left], size, self.camera), body[chosen[left]], None if value is None else value[left])
         return seen, position
 
-    def _pixel_colours(self, seen: Buffers) -> np.ndarray:
+    def _pixel_colours(self, seen: Buffers, frame: Frame) -> np.ndarray:
         if self.scalar:
-            return colours.mapped(seen.value, self.low, self.high, self.map)
+            picture = colours.mapped(seen.value, self.low, self.high, self.map)
+            picture[seen.hit & np.isin(seen.owner, self.scalar.lacking(self.run, frame))] = colours.DRIVEN
+            return picture
         picture = np.zeros((*seen.owner.shape, 3))
         picture[seen.hit] = self.colour(seen.owner[seen.hit])
         return picture
@@ -151,7 +153,7 @@ class Scene:
             position = position[plane.above(position) < 0]
         shadows = shading.Shadows(camera.turn(position - camera.target), spacing)
         line = shading.silhouettes(seen, spacing)
-        picture = shading.shade(seen, camera, self._pixel_colours(seen), shadows, line, spacing, exact=self.scalar is not None)
+        picture = shading.shade(seen, camera, self._pixel_colours(seen, frame), shadows, line, spacing, exact=self.scalar is not None)
         return box_lines(picture, camera, seen.depth, self.box)
 
     def sheet(self, frame: Frame, title: str) -> Sheet:

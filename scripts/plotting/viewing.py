@@ -165,7 +165,8 @@ class Page:
         self.ends = []
         for value in self.shown:
             sample = self.frames[:: -(-len(self.frames) // 6)]
-            self.ends.append(limits([value.values(run, frame) for frame in sample if frame.points], value.signed))
+            self.ends.append(limits([value.values(run, frame) for frame in sample if frame.points], value.signed,
+                                    value.noise(run)))
 
     def _default_values(self) -> list[str]:
         first = self.frames[0]

@@ -233,7 +233,8 @@ Vec3 Table::as_vector(const toml::node& node, std::string_view key, int size, co
     errors_->add(at, path_of(key), fmt::format("is {}; must be an array of {} numbers", kind_of(node), size));
   } else if (std::ssize(*array) != size) {
     errors_->add(at, path_of(key),
-                 fmt::format("has {} entries; must have {} numbers, one for each direction", array->size(), size));
+                 fmt::format("has {} entries; must have {} numbers, one for each direction{}", array->size(), size,
+                             size == 2 && array->size() == 3 ? "; a case in space has domain.dimension = 3" : ""));
   } else {
     for (int i = 0; i < size; ++i) result[i] = as_number(*array->get(i), key, range).value_or(1.0);
   }

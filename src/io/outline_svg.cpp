@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <numbers>
@@ -251,7 +252,14 @@ Map transform_of(const Tag& tag) {
   }
 }
 
+/// Elements whose contents are not drawn where they stand.
+bool only_defines(const Tag& tag) {
+  static constexpr std::array names = {"defs", "clipPath", "mask", "symbol", "pattern", "marker"};
+  return std::ranges::find(names, tag.name) != names.end();
+}
+
 std::vector<Line> lines_of(const Tag& tag) {
+  if (tag.name == "use") tag.place.fail(tag.text.data(), "<use> is not read; make a path of what it draws");
   if (tag.name == "path") return Path(tag.place, tag.attribute("d")).read();
   Line line;
   if (tag.name == "polygon" || tag.name == "polyline") {
@@ -280,6 +288,7 @@ std::vector<LinePart> read_svg_lines(std::string_view bytes) {
   const Text place{bytes};
   std::vector<LinePart> all;
   std::vector<Map> maps = {Map::Identity()};
+  std::size_t hidden = 0;  // depth of an element whose contents are not drawn; 0: none
   bool drawing = false;
   for (std::size_t at = bytes.find('<'); at != bytes.npos; at = bytes.find('<', at)) {
     const bool comment = bytes.substr(at).starts_with("<!--");
@@ -290,12 +299,18 @@ std::vector<LinePart> read_svg_lines(std::string_view bytes) {
     if (comment || text.starts_with('?') || text.starts_with('!')) continue;
     if (text.starts_with('/')) {
       if (maps.size() > 1) maps.pop_back();
+      if (maps.size() <= hidden) hidden = 0;
       continue;
     }
     const bool alone = text.ends_with('/');
     if (alone) text.remove_suffix(1);
     const Tag tag{place, text.substr(0, text.find_first_of(" \t\r\n")), text};
     drawing = drawing || tag.name == "svg";
+    if (hidden > 0 || only_defines(tag)) {
+      if (hidden == 0 && !alone) hidden = maps.size();
+      if (!alone) maps.push_back(maps.back());
+      continue;
+    }
     const Map map = maps.back() * transform_of(tag);
     for (Line& line : lines_of(tag)) {
       for (Vec3& p : line) {

@@ -25,8 +25,10 @@ sys.path.insert(0, str(ROOT / "scripts" / "plotting"))
 sys.dont_write_bytecode = True
 import chains  # noqa: E402
 import colours  # noqa: E402
+import figures  # noqa: E402
 import film  # noqa: E402
 import results  # noqa: E402
+import scalars  # noqa: E402
 from camera import Camera, View  # noqa: E402
 from lattice import Lattice  # noqa: E402
 from look import Look  # noqa: E402
@@ -237,6 +239,39 @@ def test_real(cairn: Program, scratch: Path) -> None:
     picture = np.asarray(Image.open(scratch / "two" / "pictures" / "force_chains.png").convert("RGB")).astype(int)
     strong = np.abs(picture - 255 * chains.STRONG).sum(axis=2) < 12
     expect(strong.mean() > 2e-3, f"{strong.mean()} of the picture are strong lines")
+
+
+LID = """
+domain = { upper = [1.0, 1.0], cells = [20, 20], gravity = [0.0, -9.81] }
+time = { steps = 40 }
+materials.soft = { model = "neo_hookean", density = 1e3, shear_modulus = 1e5, bulk_modulus = 1e5 }
+materials.steel = { model = "rigid" }
+bodies = [{ shape = { type = "disk", centre = [0.5, 0.3], radius = 0.28 }, material = "soft" },
+          { shape = { type = "box", lower = [0.1, 0.6], upper = [0.9, 0.8] }, material = "steel", group = "lid" }]
+drive = [{ bodies = { group = "lid" }, velocity = [0.0, -0.5] }]
+output = { particles = { every = 20 } }
+"""
+
+
+def test_bodies_without_stress(cairn: Program, scratch: Path) -> None:
+    """Rigid bodies are grey where stress is shown, and not the colour of zero; where speed is, they have its colour."""
+    (scratch / "case.toml").write_text(LID)
+    expect_code(cairn("run", scratch / "case.toml", "--out", scratch / "run"), 0)
+    run = results.Run(scratch / "run")
+    frame, grey = run.frames[-1], np.rint(255 * colours.DRIVEN)
+    expect(run.driven_bodies.tolist() == [1], run.driven_bodies)
+    for name, right in (("pressure", True), ("speed", False)):
+        shown = scalars.SCALARS[name]
+        picture = figures.value_picture(run, frame, shown, scalars.scale(run, [frame], shown, None), 100)
+        expect(np.allclose(picture[68, 50], grey) == right, f"{name}: the lid is {picture[68, 50]}")
+        expect(not np.allclose(picture[30, 50], grey), f"{name}: the disk is grey")
+
+
+def test_rounding_errors_are_no_pattern(cairn: Program, scratch: Path) -> None:
+    """A scale does not end below what stress is known to."""
+    values = [np.array([-3e-12, 0.0, 5e-12])]
+    expect(scalars.limits(values, True, 1e-8) == (-1e-8, 1e-8), "signed")
+    expect(scalars.limits(values, True) == scalars.limits(values, True, 1e-13), "what is above is not changed")
 
 
 def test_progress(cairn: Program, scratch: Path) -> None:

@@ -117,7 +117,10 @@ def test_outlines(cairn, here):
         expect(abs(found / right - 1) < 2e-3, f"{name}: {found}")
         expect(box == ("[10, 10] to [30, 30]" if name.endswith("svg") else "[0, 0] to [20, 20]"), f"{name}: {box}")
         expect(abs(thin - 5 / 1.875) < 0.3, f"{name}: {thin}")
-    bad = {"open.svg": (make.SVG.replace(" z", ""), ":4: a path is not closed"), "open.dxf": (make.DXF.replace("21\n0\n0\nLWP", "21\n1\n0\nLWP"), "close it"),
+    unseen = '<defs><g><rect width="50" height="50"/></g></defs><clipPath id="a"/><symbol><circle r="99"/></symbol>'
+    (here / "unseen.svg").write_text(make.SVG.replace("<g ", unseen + "<g ", 1))
+    expect(abs(volume(check(cairn, here, 'type = "outline", file = "unseen.svg", unit = "m"', HEAD_2D))[0] - 300) < 0.6, "unseen.svg")
+    bad = {"use.svg": (make.SVG.replace("</g>", '<use href="#a"/></g>'), ":4: <use> is not read"), "open.svg": (make.SVG.replace(" z", ""), ":4: a path is not closed"), "open.dxf": (make.DXF.replace("21\n0\n0\nLWP", "21\n1\n0\nLWP"), "close it"),
            "spline.dxf": (make.DXF.replace("CIRCLE", "SPLINE"), "SPLINE is not read"), "cross.csv": ("0,0\n2,2\n2,0\n0,2\n", "cross or touch"),
            "number.csv": ("x,y\n0,0\n1,q\n1,1\n", ':3: y: "q"'), "cut.svg": (make.SVG[:150], "cut off")}
     for name, (content, words) in bad.items():
@@ -267,6 +270,34 @@ def test_labels_of_every_kind(_, here):
         expect("1 pairs touch" in done.stdout, done.stdout)
     with h5py.File(here / "out.h5") as file:
         expect(abs(file.attrs["corner_x"]) < 1e-12, "corner")
+
+
+IN_A_FILE = """
+import runpy, sys
+sys.path.insert(0, sys.argv[1])
+from converting import scratch
+scratch.SMALL = 0
+sys.argv[:2] = ["convert-labels"]
+runpy.run_path(sys.path[0] + "/convert-labels", run_name="__main__")
+"""
+
+
+def test_large_labels_are_the_same(_, here):
+    """Volumes that are worked on in a file give what those in memory do."""
+    if not has_scipy():
+        return print("labels: skipped, scipy is not there")
+    voxels = make.labels((40, 36, 70))
+    voxels[33, 20, 20] = 9
+    source = make.metaimage(voxels, here)
+    options = ["--unit", "mm", "--split", "--crop", "0,2,1,40,36,70"]
+    expect(convert(source, "-o", here / "memory.h5", *options).returncode == 0, "in memory")
+    done = subprocess.run([sys.executable, "-B", "-c", IN_A_FILE, ROOT / "scripts", source, "-o", here / "file.h5", *options],
+                          capture_output=True, text=True, timeout=120 * PATIENCE, check=False)
+    expect(done.returncode == 0 and "dropped" in done.stderr, done.stderr)
+    with h5py.File(here / "memory.h5") as a, h5py.File(here / "file.h5") as b:
+        expect(sorted(a) == sorted(b) and all(np.array_equal(a[n][()], b[n][()]) for n in a), "other values")
+        expect(len(a["depth"]) == 69 and a["depth"][()].max() == 255, "no depths")
+    expect(not list(here.glob("tmp*")), "a file is left")
 
 
 def test_labels_are_cleaned(_, here):
