@@ -14,20 +14,19 @@ constexpr int stress_sums = 11, flow_sums = stress_sums + 6, flow_width = 22, po
 constexpr int sum_count = point_sums + ledger_sums + crack_sums;
 using Sums = std::array<double, sum_count>;
 
-/// The volume, m x, m x (x) x, m v (x) x of a piece's points, x from the middle of the domain.
+/// The volume, m x, m x (x) x, m v (x) x of a piece's points, x from a place near bodies.
 template <int Dim>
-void add_flow(const Piece<Dim>& piece, double density, const Lattice<Dim>& lattice, double* sums) {
+void add_flow(const Piece<Dim>& piece, double density, const Vec3& origin, double* sums) {
   using C = PointColumns<Dim>;
   const Points<Dim>& points = piece.points;
-  const Vec<Dim> middle = 0.5 * (lattice.lower() + lattice.upper());
   for (int p = 0; p < points.size(); ++p) {
     const double volume = points.column(C::volume)[p], mass = density * volume;
     sums[0] += volume * volume_ratio(points, p);
     for (int i = 0; i < Dim; ++i) {
-      const double moment = mass * (points.column(i)[p] - middle[i]);
+      const double moment = mass * (points.column(i)[p] - origin[i]);
       sums[1 + i] += moment;
       for (int j = 0; j < Dim; ++j) {
-        sums[4 + 3 * i + j] += moment * (points.column(j)[p] - middle[j]);
+        sums[4 + 3 * i + j] += moment * (points.column(j)[p] - origin[j]);
         sums[13 + 3 * j + i] += moment * points.column(C::velocity + j)[p];
       }
     }
@@ -60,7 +59,7 @@ void add_piece(const Simulation<Dim>& simulation, const Piece<Dim>& piece, Sums&
   if (rigid) return;
   const auto stress = stress_of_points(piece, simulation.material_of(piece).density);
   for (std::size_t i = 0; i < stress.size(); ++i) sums[stress_sums + i] += stress[i];
-  add_flow(piece, simulation.material_of(piece).density, simulation.lattice(), &sums[flow_sums]);
+  add_flow(piece, simulation.material_of(piece).density, simulation.bodies()[0].centre, &sums[flow_sums]);
 }
 
 Totals totals_of(const Sums& sums) {

@@ -51,7 +51,7 @@ LARGE = {2: 1_000_000, 3: 10_000}
 # A checkpoint knows its case and how many patches there is room for, and with that its numbers and their checksum.
 OF_DOMAIN = ("/case", "numbers_checksum", "attribute patches", "patch_id", "checksums", "attribute upper_",
              "attribute history_")
-COLUMNS_OF_DOMAIN = ("length_", "stress_")  # of history.csv: how large it is, and means over it
+COLUMNS_OF_DOMAIN = ("length_", "stress_", "inertial_number")  # of history.csv: how large it is, and means over it
 
 
 def case(scratch: Path, dim: int, cells: int, far: bool = False) -> Path:
