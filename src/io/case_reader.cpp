@@ -208,7 +208,7 @@ bool Table::boolean(std::string_view key, bool fallback) {
   return node && node->is_boolean() ? node->as_boolean()->get() : fallback;
 }
 
-std::string Table::text(std::string_view key, std::optional<std::string> fallback) {
+std::string Table::text(std::string_view key, const std::optional<std::string>& fallback) {
   const toml::node* node = find(key);
   if (!node) {
     if (!fallback) missing(key);
@@ -241,7 +241,7 @@ Vec3 Table::as_vector(const toml::node& node, std::string_view key, int size, co
   return result;
 }
 
-Vec3 Table::vector(std::string_view key, int size, std::optional<Vec3> fallback, const Range& range) {
+Vec3 Table::vector(std::string_view key, int size, const std::optional<Vec3>& fallback, const Range& range) {
   const toml::node* node = find(key);
   if (!node && !fallback) missing(key, fmt::format("is missing; it must be an array of {} numbers", size));
   return node ? as_vector(*node, key, size, range) : fallback.value_or(Vec3::Zero());

@@ -94,9 +94,9 @@ class Table {
   std::int64_t integer(std::string_view key, std::optional<std::int64_t> fallback, std::int64_t lower,
                        std::int64_t upper);
   bool boolean(std::string_view key, bool fallback);
-  std::string text(std::string_view key, std::optional<std::string> fallback);
+  std::string text(std::string_view key, const std::optional<std::string>& fallback);
   /// Numbers [size] as a vector padded with zeros.
-  Vec3 vector(std::string_view key, int size, std::optional<Vec3> fallback, const Range& range = any_finite);
+  Vec3 vector(std::string_view key, int size, const std::optional<Vec3>& fallback, const Range& range = any_finite);
   std::vector<Vec3> vectors(std::string_view key, int size);
   /// One number for each direction, or one for all.
   Vec3 scalar_or_vector(std::string_view key, int size, const Range& range);
